@@ -78,18 +78,6 @@ fn radau_damps_conduction_that_is_far_faster_than_a_step() {
 
 #[test]
 fn a_lattice_without_implicit_steps_says_which_method_to_take() {
-    let spins = Lattice::on(Graph::ring(4), Sphere::<2>::round())
-        .bracket(AreaForm)
-        .energy(|n: &Vector3<Real>| n.z * n.z)
-        .build()
-        .unwrap();
-    let start = spins.points(|_| vector![0.6, 0.0, 0.8]);
-    let refusal = |error: RunError<_>| match error {
-        RunError::Method(error) => *error.downcast_ref::<NoImplicitSteps>().unwrap(),
-        error => panic!("{error}"),
-    };
-    let found = WeylMidpoint.run(&spins, start, Span::steps(0.1, 1)).unwrap_err();
-    assert_eq!(refusal(found), NoImplicitSteps::Space);
     let long = chain(Graph::ring(400));
     let start = long.points(waves);
     let refusal = |error: RunError<_>| match error {
@@ -104,21 +92,6 @@ fn a_lattice_without_implicit_steps_says_which_method_to_take() {
     let found = RandomFlow(WeylMidpoint).seed(1).run(&noisy, start, Span::steps(0.1, 1));
     let Err(RunError::Method(error)) = found else { panic!("it has a step") };
     assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Variables { variables: 1200 }));
-    // The chart of a half line is a logarithm.
-    let gas = Lattice::on(Graph::chain(4), HalfLine)
-        .energy(|u: &Vector1<Real>| u.x)
-        .entropy(|u: &Vector1<Real>| u.x.ln())
-        .bond_onsager(|bond| {
-            let [u, v] = bond.w.map(|w| w.x);
-            [Onsager { rate: 1.0, b: [vector![v], vector![-u]] }]
-        })
-        .build()
-        .unwrap()
-        .with_noise(Boltzmann(1e-20));
-    let start = gas.flow().points(|i| vector![1.0 + i as f64]);
-    let found = RandomFlow(Gauss::<2>).seed(1).run(&gas, start, Span::steps(0.01, 1));
-    let Err(RunError::Method(error)) = found else { panic!("it has a step") };
-    assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Space));
     let short = chain(Graph::ring(8));
     let steps = WeylMidpoint.steps(&short, short.points(waves), Span::steps(0.1, 2)).unwrap();
     let Err(error) = WeylMidpoint.resume(&long, &steps.checkpoint()) else {

@@ -504,17 +504,6 @@ fn an_open_lattice_without_implicit_steps_is_refused() {
         panic!("it has a step")
     };
     assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Variables { variables: 1200 }));
-    let spins = Lattice::on(Graph::ring(4), Sphere::<2>::round())
-        .bracket(AreaForm)
-        .energy(|n: &Vector3<Real>| n.z * n.z)
-        .build()
-        .unwrap()
-        .opened();
-    let start = spins.start(spins.lattice().points(|_| vector![0.6, 0.0, 0.8]));
-    let Err(RunError::Method(error)) = WeylMidpoint.run(&spins, start, Span::steps(0.1, 1)) else {
-        panic!("it has a step")
-    };
-    assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Space));
 }
 
 /// A bath that is below zero inside a step, and one whose temperature is known from a time on.

@@ -1,15 +1,17 @@
 //! A system in plain numbers.
 
 use metriplectic_equations::judge::coordinate_scales;
-use metriplectic_equations::room::with_numbers;
 use metriplectic_equations::{
-    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, PointError,
-    SecondLaw, Sizes,
+    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, Path, PathAt,
+    PathSlopes, Paths, PointError, SecondLaw, Sizes,
 };
 use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector,
-    differential_at,
+    differential_at, hessian_at,
+};
+use metriplectic_manifolds::in_numbers::{
+    PathsInNumbers, column, point, put, put_matrix, with_entries, write,
 };
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 use num_dual::Dual64;
@@ -43,52 +45,6 @@ pub struct InNumbers<'a, Y: ?Sized>(pub &'a Y);
 
 /// The manifold of a system.
 type Of<Y> = <Y as Metriplectic>::Manifold;
-
-/// Reads a point from its entries.
-#[inline]
-pub(crate) fn point<M: Manifold>(x: &[f64]) -> M::Point<f64> {
-    let mut entries = x.iter();
-    M::assemble(&mut || *entries.next().expect("a state has all of its entries"))
-}
-
-/// Writes the entries of a point.
-#[inline]
-fn write<M: Manifold>(x: &M::Point<f64>, to: &mut [f64]) {
-    let mut to = to.iter_mut();
-    M::write(x, &mut |entry| *to.next().expect("a slice has the entries of a state") = entry);
-}
-
-/// Calls `f` with the entries of a point, without an allocation where they are few.
-pub(crate) fn with_entries<M: Manifold, T>(x: &M::Point<f64>, f: impl FnOnce(&[f64]) -> T) -> T {
-    let mut entries = 0;
-    M::write(x, &mut |_| entries += 1);
-    with_numbers(entries, |to| {
-        write::<M>(x, to);
-        f(to)
-    })
-}
-
-/// Reads a column.
-#[inline]
-fn column<V: Column<f64>>(numbers: &[f64]) -> V {
-    let numbers = &numbers[..V::LEN];
-    V::from_index(|i| numbers[i])
-}
-
-/// Writes a column.
-#[inline]
-fn put<V: Column<f64>>(v: &V, to: &mut [f64]) {
-    let to = &mut to[..V::LEN];
-    (0..V::LEN).for_each(|i| to[i] = v[i]);
-}
-
-/// Writes a matrix row by row.
-fn put_matrix<A: Square<f64>>(a: &A, to: &mut [f64]) {
-    let n = A::Column::LEN;
-    for (i, row) in to.chunks_exact_mut(n).enumerate() {
-        (0..n).for_each(|j| row[j] = a[(i, j)]);
-    }
-}
 
 /// Visits fields of a system.
 trait WithField<M: Space> {
@@ -168,6 +124,22 @@ impl<M: Space> WithField<M> for Along<'_, M> {
     }
 }
 
+/// The derivatives of fields along a curve, one after another.
+struct AlongCurve<'a, M: Space> {
+    x: &'a M::Point<Real>,
+    to: std::slice::IterMut<'a, [f64; 2]>,
+}
+
+impl<M: Space> WithField<M> for AlongCurve<'_, M> {
+    #[inline]
+    fn visit(&mut self, f: &impl ScalarField<M>) {
+        if let Some(to) = self.to.next() {
+            let f = f.at_real(self.x);
+            *to = [f.eps1, f.eps1eps2];
+        }
+    }
+}
+
 /// Value, differential and Hessian of a field.
 struct Second<'a, M: Space> {
     x: &'a M::Point<f64>,
@@ -195,6 +167,19 @@ struct Displaced<'a, M: Space> {
 impl<M: Space> WithField<M> for Displaced<'_, M> {
     fn visit(&mut self, f: &impl ScalarField<M>) {
         put(&differential_at(f, self.x, &self.q), self.df);
+    }
+}
+
+/// The Hessian of a field at a displacement.
+struct Bent<'a, M: Space> {
+    x: &'a M::Point<f64>,
+    q: Vector<M>,
+    hf: &'a mut [f64],
+}
+
+impl<M: Space> WithField<M> for Bent<'_, M> {
+    fn visit(&mut self, f: &impl ScalarField<M>) {
+        put_matrix(&hessian_at(f, self.x, &self.q), self.hf);
     }
 }
 
@@ -496,6 +481,10 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
         Y::Entropy::IS_CONSTANT
     }
 
+    fn paths(&self) -> Option<&dyn Paths> {
+        Some(self)
+    }
+
     fn along(&self, law: usize, _: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
         let n = Dim::<Y>::LEN;
         let (u, v) = (&u[..n], &v[..n]);
@@ -505,6 +494,18 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
         let mut along = Along::<Of<Y>> { x: &x, found: [0.0; 4] };
         self.law(law, &mut along);
         along.found
+    }
+
+    fn along_curve(
+        &self,
+        _: f64,
+        (_, path): (&dyn Paths, Path),
+        start: (&[f64], &[f64], f64),
+        to: &mut [[f64; 2]],
+    ) -> Result<(), MetricError> {
+        let x = self.on_manifold().at_time(path, start)?;
+        self.laws(&mut AlongCurve::<Of<Y>> { x: &x, to: to.iter_mut() });
+        Ok(())
     }
 
     fn jet(&self, law: usize, _: f64, x: &[f64], df: &mut [f64]) -> f64 {
@@ -527,6 +528,11 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
     fn differential_at(&self, law: usize, _: f64, x: &[f64], q: &[f64], df: &mut [f64]) {
         let (x, q) = (&point::<Of<Y>>(x), column(q));
         with_room::<Dim<Y>, _>(|| self.law(law, &mut Displaced { x, q, df }));
+    }
+
+    fn hessian_at(&self, law: usize, _: f64, x: &[f64], q: &[f64], hf: &mut [f64]) {
+        let (x, q) = (&point::<Of<Y>>(x), column(q));
+        with_room::<Dim<Y>, _>(|| self.law(law, &mut Bent { x, q, hf }));
     }
 
     fn independence(&self, _: f64, x: &[f64], fractions: &mut [f64]) {
@@ -722,6 +728,72 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
         with_room::<Dim<Y>, _>(|| {
             self.0.invariants().each(&mut Acting { act, left: invariant + 1 });
         });
+    }
+}
+
+impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
+    fn on_manifold(&self) -> PathsInNumbers<'_, Of<Y>, Y::Metric> {
+        PathsInNumbers::new(self.0.metric())
+    }
+}
+
+impl<Y: Metriplectic + ?Sized> Paths for InNumbers<'_, Y> {
+    fn follows(&self, path: Path) -> bool {
+        self.on_manifold().follows(path)
+    }
+
+    fn path(
+        &self,
+        path: Path,
+        x: &[f64],
+        u: &[f64],
+        to: &mut PathAt<'_>,
+    ) -> Result<(), MetricError> {
+        self.on_manifold().path(path, x, u, to)
+    }
+
+    fn path_jet(
+        &self,
+        path: Path,
+        x: &[f64],
+        u: &[f64],
+        to: (&mut PathAt<'_>, &mut PathSlopes<'_>),
+    ) -> Result<(), MetricError> {
+        self.on_manifold().path_jet(path, x, u, to)
+    }
+
+    fn end(&self, path: Path, x: &[f64], u: &[f64], end: &mut [f64]) -> Result<(), MetricError> {
+        self.on_manifold().end(path, x, u, end)
+    }
+
+    fn curve(
+        &self,
+        path: Path,
+        start: (&[f64], &[f64], f64),
+        y: &mut [f64],
+        to: [&mut [f64]; 2],
+    ) -> Result<(), MetricError> {
+        self.on_manifold().curve(path, start, y, to)
+    }
+
+    fn lost_digits(&self, path: Path, x: &[f64], u: &[f64], end: &[f64], lost: &mut [f64]) {
+        self.on_manifold().lost_digits(path, x, u, end, lost);
+    }
+
+    fn accuracy(&self, path: Path) -> f64 {
+        self.on_manifold().accuracy(path)
+    }
+
+    fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
+        self.on_manifold().velocity_at(y, x, q, v, to);
+    }
+
+    fn transport(&self, x: &[f64], y: &[f64], vectors: &mut [f64]) {
+        self.on_manifold().transport(x, y, vectors);
+    }
+
+    fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
+        self.on_manifold().pairing_size(w, v)
     }
 }
 

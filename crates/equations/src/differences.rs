@@ -1,11 +1,11 @@
 //! Systems whose parts are known apart, with derivatives by differences.
 
 use crate::{
-    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, PointError,
-    SecondLaw, Sizes,
+    ByCharts, Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, Paths,
+    PointError, SecondLaw, Sizes,
 };
 
-/// A system on a vector space whose bracket and friction are known apart.
+/// A system whose bracket and friction are known apart.
 ///
 /// [`Differences`] makes it a [`Model`], of which implicit methods take steps.
 pub trait Apart: Equations {
@@ -21,13 +21,24 @@ pub trait Apart: Equations {
     /// linear in `α`, which a force does not have. A friction annihilates `w`, the covector of the energy. It may depend on that of the
     /// entropy, as on temperatures; Newton's method leaves out the derivatives along this one, and takes more iterations then.
     fn apply(&self, part: Part, t: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]);
+
+    /// Returns whether the space has [charts](Equations::chart) and [sizes](Equations::scales) of its own. By default it is a vector space,
+    /// whose charts are translations and whose sizes are `|x_i|`, and neither is asked for.
+    fn has_charts(&self) -> bool {
+        false
+    }
+
+    /// Returns the paths of steps on a space that has charts, if they are known; else they are the [lines of the charts](ByCharts).
+    fn paths(&self) -> Option<&dyn Paths> {
+        None
+    }
 }
 
 /// A system whose derivatives are formed by central differences: Hessians from differentials, and those of its parts.
 ///
 /// Implicit methods need them for Newton's method alone, so both laws are exact, and a step differs by round-off from that with
-/// derivatives by hand. It lives on a vector space with the canonical inner product: charts are translations, and sizes
-/// `|x_i|`, whatever the system says of them. The step of a difference is relative to an entry. That of an entry which is zero is relative to
+/// derivatives by hand. It has the canonical inner product of each chart. Charts are translations, and sizes
+/// `|x_i|`, unless the system [has others](Apart::has_charts). The step of a difference is relative to an entry. That of an entry which is zero is relative to
 /// the distance over which it changes a law, or to the largest entry: let one entry at least have the size of the motion.
 ///
 /// A pendulum with friction that heats a bath, `q' = p, p' = −sin q − γ p/T, u' = γ p²/T` with the temperature `T = 1 + u`:
@@ -160,8 +171,52 @@ impl<S: Apart> Equations for Differences<S> {
         self.0.defect(x)
     }
 
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        if self.0.has_charts() {
+            return self.0.scales(x, sizes);
+        }
+        sizes.iter_mut().zip(x).for_each(|(size, x)| *size = x.abs());
+    }
+
     fn is_vector_space(&self) -> bool {
-        true
+        !self.0.has_charts()
+    }
+
+    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+        if self.0.has_charts() {
+            return self.0.chart(x, q, y);
+        }
+        y.copy_from_slice(&moved(x, 1.0, q));
+    }
+
+    fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
+        if self.0.has_charts() {
+            return self.0.coordinates(x, y, q);
+        }
+        q.copy_from_slice(&moved(y, -1.0, x));
+        q.iter().all(|q| q.is_finite())
+    }
+
+    fn stage_state(&self, x: &[f64], q: &[f64], y: &mut [f64]) -> bool {
+        if self.0.has_charts() {
+            return self.0.stage_state(x, q, y);
+        }
+        self.chart(x, q, y);
+        y.iter().all(|y| y.is_finite())
+    }
+
+    fn stage_coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) {
+        if self.0.has_charts() {
+            return self.0.stage_coordinates(x, y, q);
+        }
+        let _ = self.coordinates(x, y, q);
+    }
+
+    fn stage_rates(&self, x: &[f64], q: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
+        if self.0.has_charts() {
+            return self.0.stage_rates(x, q, y, v, rates);
+        }
+        rates.copy_from_slice(v);
     }
 
     fn velocity_with(&self, t: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
@@ -180,6 +235,11 @@ impl<S: Apart> Equations for Differences<S> {
 /// `x + s u`.
 fn moved(x: &[f64], s: f64, u: &[f64]) -> Vec<f64> {
     x.iter().zip(u).map(|(x, u)| x + s * u).collect()
+}
+
+/// `s u`.
+fn scaled(s: f64, u: &[f64]) -> Vec<f64> {
+    u.iter().map(|u| s * u).collect()
 }
 
 fn unit(n: usize, k: usize) -> Vec<f64> {
@@ -223,9 +283,13 @@ fn jets(system: &(impl Equations + ?Sized), t: f64, x: &[f64]) -> [Vec<f64>; 2] 
 /// of the other entries; else that which the velocity covers in the median of the times in which entries change by their sizes; else the
 /// largest one.
 fn sizes_at(system: &(impl Equations + ?Sized), t: f64, x: &[f64]) -> Vec<Size> {
+    sizes_of(system, t, x, x.iter().map(|x| x.abs()).collect())
+}
+
+/// The same, of entries with these sizes of their own.
+fn sizes_of(system: &(impl Equations + ?Sized), t: f64, x: &[f64], own: Vec<f64>) -> Vec<Size> {
     let n = system.sizes().directions;
     let [_, w] = jets(system, t, x);
-    let own: Vec<f64> = x.iter().map(|x| x.abs()).collect();
     let largest = own.iter().copied().fold(0.0, f64::max);
     let mut v = vec![0.0; n];
     let has_velocity = system.velocity(t, x, &mut v).is_some();
@@ -351,6 +415,60 @@ impl<S: Apart> Differences<S> {
         self.0.sizes().directions
     }
 
+    /// The sizes of the entries, one for each direction.
+    fn sizes_at(&self, t: f64, x: &[f64]) -> Vec<Size> {
+        let mut own = vec![0.0; self.n()];
+        self.scales(x, &mut own);
+        sizes_of(&self.0, t, x, own)
+    }
+
+    /// The columns of the derivative of `φ_y⁻¹ ∘ φ_x` at `q`, one after another.
+    fn turned(&self, y: &[f64], x: &[f64], q: &[f64]) -> Vec<f64> {
+        let (n, by_charts) = (self.n(), ByCharts(self));
+        let mut columns = vec![0.0; n * n];
+        self.0.paths().unwrap_or(&by_charts).turned(y, x, q, &mut columns);
+        columns
+    }
+
+    /// All laws with their differentials at `φ_x(q)`, in the chart at `x`.
+    fn jets_at(&self, t: f64, x: &[f64], q: &[f64]) -> [Vec<f64>; 2] {
+        if !self.0.has_charts() {
+            return jets(&self.0, t, &moved(x, 1.0, q));
+        }
+        let mut y = vec![0.0; x.len()];
+        self.0.chart(x, q, &mut y);
+        let ([values, w], n) = (jets(&self.0, t, &y), self.n());
+        let columns = self.turned(&y, x, q);
+        let along = |df: &[f64]| columns.chunks_exact(n).map(|e| dot(df, e)).collect::<Vec<_>>();
+        [values, w.chunks_exact(n).flat_map(along).collect()]
+    }
+
+    /// The vector of a part at `φ_x(q)`, with covectors and the vector in the chart at `x`.
+    fn part_at(
+        &self,
+        (part, t): (Part, f64),
+        (x, q): (&[f64], &[f64]),
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) {
+        if !self.0.has_charts() {
+            return self.0.apply(part, t, &moved(x, 1.0, q), w, alpha, v);
+        }
+        let (n, mut y) = (self.n(), vec![0.0; x.len()]);
+        self.0.chart(x, q, &mut y);
+        let columns = self.turned(x, &y, &vec![0.0; n]);
+        let there = |w: &[f64]| columns.chunks_exact(n).map(|e| dot(w, e)).collect::<Vec<_>>();
+        let [energy, entropy, alpha] = [w.energy, w.entropy, alpha].map(there);
+        let w = Covectors { energy: &energy, entropy: &entropy };
+        let mut here = vec![0.0; n];
+        self.0.apply(part, t, &y, w, &alpha, &mut here);
+        v.fill(0.0);
+        for (e, a) in columns.chunks_exact(n).zip(here) {
+            v.iter_mut().zip(e).for_each(|(v, e)| *v += a * e);
+        }
+    }
+
     /// The sizes of the components of a covector in units of these sizes of the entries.
     fn covector_sizes(w: &[f64], sizes: &[Size]) -> Vec<Size> {
         let terms: f64 = w.iter().zip(sizes).map(|(w, size)| (w * size.own).abs()).sum();
@@ -361,12 +479,11 @@ impl<S: Apart> Differences<S> {
         w.iter().zip(sizes).map(size).collect()
     }
 
-    /// The vector of a part; an error where it has none.
+    /// The vector of a part at `φ_x(q)`; an error where it has none.
     fn vector(
         &self,
-        part: Part,
-        t: f64,
-        x: &[f64],
+        (part, t): (Part, f64),
+        (x, q): (&[f64], &[f64]),
         w: Covectors<'_>,
         alpha: &[f64],
         v: &mut [f64],
@@ -375,7 +492,11 @@ impl<S: Apart> Differences<S> {
             v.fill(0.0);
             return Ok(());
         }
-        self.0.apply(part, t, x, w, alpha, v);
+        if q.iter().all(|q| *q == 0.0) {
+            self.0.apply(part, t, x, w, alpha, v);
+        } else {
+            self.part_at((part, t), (x, q), w, alpha, v);
+        }
         let bad = v.iter().find(|v| !v.is_finite());
         let quantity = "a velocity of a part";
         bad.map_or(Ok(()), |&value| Err(MetricError::NotFinite { quantity, value }))
@@ -399,6 +520,10 @@ impl<S: Apart> Model for Differences<S> {
         true
     }
 
+    fn paths(&self) -> Option<&dyn Paths> {
+        self.0.paths()
+    }
+
     fn value(&self, law: usize, t: f64, x: &[f64]) -> f64 {
         let mut values = vec![0.0; self.0.sizes().laws];
         self.0.values(t, x, &mut values);
@@ -408,11 +533,9 @@ impl<S: Apart> Model for Differences<S> {
     fn along(&self, law: usize, t: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
         let mut df = vec![0.0; u.len()];
         let value = self.jet(law, t, x, &mut df);
-        let step = step_along(u, &sizes_at(&self.0, t, x));
+        let step = step_along(u, &self.sizes_at(t, x));
         let mut change = df.clone();
-        quotient(step, &mut change, |s, df| {
-            self.jet(law, t, &moved(x, s, u), df);
-        });
+        quotient(step, &mut change, |s, df| self.differential_at(law, t, x, &scaled(s, u), df));
         [value, dot(&df, u), dot(&df, v), dot(&change, v)]
     }
 
@@ -426,8 +549,8 @@ impl<S: Apart> Model for Differences<S> {
     fn hessian(&self, law: usize, t: f64, x: &[f64], df: &mut [f64], hf: &mut [f64]) -> f64 {
         let n = df.len();
         let mut bend = vec![0.0; n * n];
-        columns(&sizes_at(&self.0, t, x), &mut bend, |e, s, df| {
-            self.jet(law, t, &moved(x, s, e), df);
+        columns(&self.sizes_at(t, x), &mut bend, |e, s, df| {
+            self.differential_at(law, t, x, &scaled(s, e), df);
         });
         for k in 0..n * n {
             hf[k] = 0.5 * (bend[k] + bend[k % n * n + k / n]);
@@ -436,14 +559,15 @@ impl<S: Apart> Model for Differences<S> {
     }
 
     fn differential_at(&self, law: usize, t: f64, x: &[f64], q: &[f64], df: &mut [f64]) {
-        self.jet(law, t, &moved(x, 1.0, q), df);
+        let n = df.len();
+        df.copy_from_slice(&self.jets_at(t, x, q)[1][law * n..][..n]);
     }
 
     fn independence(&self, t: f64, x: &[f64], fractions: &mut [f64]) {
         if fractions.is_empty() {
             return;
         }
-        let (n, [_, w], sizes) = (self.n(), jets(&self.0, t, x), sizes_at(&self.0, t, x));
+        let (n, [_, w], sizes) = (self.n(), jets(&self.0, t, x), self.sizes_at(t, x));
         let in_units =
             |law: usize| -> Vec<f64> { (0..n).map(|i| w[law * n + i] * sizes[i].own).collect() };
         let mut before: Vec<Vec<f64>> = Vec::new();
@@ -499,9 +623,9 @@ impl<S: Apart> Model for Differences<S> {
         tensor: &mut [f64],
     ) -> Result<(), MetricError> {
         let n = self.n();
-        let mut column = vec![0.0; n];
+        let (mut column, nothing) = (vec![0.0; n], vec![0.0; n]);
         for k in 0..n {
-            self.vector(part, t, x, w, &unit(n, k), &mut column)?;
+            self.vector((part, t), (x, &nothing), w, &unit(n, k), &mut column)?;
             (0..n).for_each(|i| tensor[i * n + k] = column[i]);
         }
         Ok(())
@@ -511,12 +635,12 @@ impl<S: Apart> Model for Differences<S> {
         &self,
         part: Part,
         t: f64,
-        (x, q): (&[f64], &[f64]),
+        place: (&[f64], &[f64]),
         w: Covectors<'_>,
         alpha: &[f64],
         v: &mut [f64],
     ) -> Result<(), MetricError> {
-        self.vector(part, t, &moved(x, 1.0, q), w, alpha, v)
+        self.vector((part, t), place, w, alpha, v)
     }
 
     fn linearise(
@@ -528,16 +652,16 @@ impl<S: Apart> Model for Differences<S> {
         alpha: &[f64],
         jet: &mut Jet<'_>,
     ) -> Result<(), MetricError> {
-        self.vector(part, t, x, w, alpha, jet.value)?;
+        self.vector((part, t), (x, &vec![0.0; self.n()]), w, alpha, jet.value)?;
         if self.0.is_zero(part) {
             [&mut *jet.along_x, &mut *jet.along_w, &mut *jet.tensor]
                 .into_iter()
                 .for_each(|matrix| matrix.fill(0.0));
             return Ok(());
         }
-        let sizes = sizes_at(&self.0, t, x);
+        let sizes = self.sizes_at(t, x);
         columns(&sizes, jet.along_x, |e, s, v| {
-            self.0.apply(part, t, &moved(x, s, e), w, alpha, v);
+            self.part_at((part, t), (x, &scaled(s, e)), w, alpha, v);
         });
         let along = |energy: bool, to: &mut [f64]| {
             let covector = if energy { w.energy } else { w.entropy };
@@ -571,7 +695,7 @@ impl<S: Apart> Model for Differences<S> {
         if self.0.is_zero(part) {
             return Ok(false);
         }
-        let sizes = Self::covector_sizes(w.entropy, &sizes_at(&self.0, t, x));
+        let sizes = Self::covector_sizes(w.entropy, &self.sizes_at(t, x));
         columns(&sizes, slope, |e, s, v| {
             let entropy = &moved(w.entropy, s, e)[..];
             self.0.apply(part, t, x, Covectors { entropy, ..w }, alpha, v);
@@ -609,12 +733,12 @@ impl<S: Apart> Model for Differences<S> {
             slope.fill(0.0);
             return Ok(());
         }
-        let step = step_along(u, &sizes_at(&self.0, t, x));
+        let step = step_along(u, &self.sizes_at(t, x));
         quotient(step, slope, |s, v| {
             let moved_entropy = moved(entropy, s, ds);
             // A bracket depends on no covector of the energy.
             let w = Covectors { energy: &moved_entropy, entropy: &moved_entropy };
-            self.0.apply(Part::Reversible, t, &moved(x, s, u), w, alpha, v);
+            self.part_at((Part::Reversible, t), (x, &scaled(s, u)), w, alpha, v);
         });
         Ok(())
     }

@@ -4,7 +4,10 @@
 //! Whether the model keeps the laws of a metriplectic system is what the [judge](crate::judge) says.
 
 use crate::judge::{Derivatives, OF_SOLUTIONS, Row};
-use crate::{BrokenLaw, Covectors, ENTROPY, Equations, Jet, Model, Part, SecondLaw, Sizes};
+use crate::{
+    BrokenLaw, Covectors, ENTROPY, Equations, Jet, Model, Part, Path, PathAt, PathSlopes, Paths,
+    SecondLaw, Sizes,
+};
 
 /// The rest of terms that should cancel, relative to them: closures may lose some digits.
 const CANCELS: f64 = 1e-9;
@@ -148,6 +151,74 @@ pub fn model(system: &dyn Model, t: f64, x: &[f64], u: &[f64]) -> Result<(), Bro
         near("the parts add up to the velocity", &sum, &velocity)?;
     }
     Ok(())
+}
+
+/// Checks the laws of the [`Paths`] of a model at a state `x`, for the unknown `u`, which a chart there reaches twice.
+///
+/// Laws: 1. the unknown zero stays at `x`; 2. the slopes are the derivatives of the path; 3. the curve starts at `x` with the velocity
+/// `u` and ends where the path does, and its acceleration is the derivative of its velocity.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn paths(
+    system: &dyn Model,
+    paths: &dyn Paths,
+    path: Path,
+    x: &[f64],
+    u: &[f64],
+) -> Result<(), BrokenLaw> {
+    let Sizes { entries, directions: n, .. } = system.sizes();
+    let exists = |_| BrokenLaw { law: "a path exists", size: f64::NAN, bound: 0.0 };
+    let follow = |u: &[f64]| {
+        let [mut z, mut d, mut end] = [nan(entries), nan(n), nan(entries)];
+        let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+        paths.path(path, x, u, to).map(|()| [z, d, end])
+    };
+    let [z, d, end] = follow(&vec![0.0; n]).map_err(exists)?;
+    near("the unknown zero stays", &z, x)?;
+    near("the unknown zero stays", &end, x)?;
+    near("the unknown zero stays", &d, &vec![0.0; n])?;
+
+    let [mut z, mut d, mut end] = [nan(entries), nan(n), nan(entries)];
+    let [mut dz, mut dd, mut dend] = [nan(n * n), nan(n * n), nan(n * n)];
+    let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+    let slopes = &mut PathSlopes { dz: &mut dz, dd: &mut dd, dend: &mut dend };
+    paths.path_jet(path, x, u, (to, slopes)).map_err(exists)?;
+    let of_path = follow(u).map_err(exists)?;
+    near("a path with slopes is the path", &[&z[..], &d, &end].concat(), &of_path.concat())?;
+    let r: Vec<f64> = u.iter().rev().copied().collect();
+    let along = |a: &[f64]| a.chunks_exact(n).map(|row| dot(row, &r)).collect::<Vec<_>>();
+    let seen = |y: &[f64], from: &[f64], v: &[f64]| {
+        let mut to = nan(n);
+        paths.velocity_at(y, from, &vec![0.0; n], v, &mut to);
+        to
+    };
+    let expected = [&dz, &dd, &dend].map(|a| along(a)).concat();
+    derivative("slopes are the derivatives of a path", &expected, &|s, to| {
+        let moved: Vec<f64> = u.iter().zip(&r).map(|(u, r)| u + s * r).collect();
+        let Ok([there, turned, end_there]) = follow(&moved) else { return to.extend(nan(3 * n)) };
+        let (mut q, mut q_end) = (nan(n), nan(n));
+        system.coordinates(&z, &there, &mut q);
+        system.coordinates(&end, &end_there, &mut q_end);
+        to.extend(q.into_iter().chain(seen(&z, &there, &turned)).chain(q_end));
+    })?;
+
+    let curve = |t: f64| {
+        let [mut y, mut v, mut a] = [nan(entries), nan(n), nan(n)];
+        paths.curve(path, (x, u, t), &mut y, [&mut v, &mut a]).map(|()| [y, v, a])
+    };
+    let [start, v, _] = curve(0.0).map_err(exists)?;
+    near("a curve starts at the state with the unknown as its velocity", &start, x)?;
+    near("a curve starts at the state with the unknown as its velocity", &v, u)?;
+    near("a curve ends where its path does", &curve(1.0).map_err(exists)?[0], &end)?;
+    let [y, _, a] = curve(0.6).map_err(exists)?;
+    derivative("the acceleration is the derivative of the velocity", &a, &|s, to| match curve(
+        0.6 + s,
+    ) {
+        Ok([there, v, _]) => to.extend(seen(&y, &there, &v)),
+        Err(_) => to.extend(nan(n)),
+    })
 }
 
 /// Checks one law of a model.

@@ -18,6 +18,7 @@
 //! |---|---|
 //! | [`equations`] | [`Equations`]: laws, differentials, velocity and space of a system; [`Sizes`] |
 //! | [`model`] | [`Model`]: the bracket, the force, the dissipation and the metric apart, with their derivatives |
+//! | [`paths`] | [`Paths`]: the paths of steps on spaces that are not flat |
 //! | [`differences`] | [`Differences`]: a model whose derivatives are formed by differences of its parts |
 //! | [`judge`] | the laws of a model at a start, around it, and at the states of a run |
 //! | [`report`] | [`Report`]: the residual of every law |
@@ -35,6 +36,7 @@ pub mod laws;
 pub mod metric_error;
 pub mod model;
 pub mod model_error;
+pub mod paths;
 pub mod point_error;
 mod pointers;
 pub mod report;
@@ -48,6 +50,7 @@ pub use kind::Kind;
 pub use metric_error::{MetricError, NotPositive};
 pub use model::{Covectors, Jet, Model, Part};
 pub use model_error::ModelError;
+pub use paths::{ByCharts, Path, PathAt, PathSlopes, Paths};
 pub use point_error::PointError;
 pub use pointers::VerifiedEquations;
 pub use report::{LawResidual, Report};

@@ -1,7 +1,7 @@
 //! The parts of a system apart.
 
 use crate::room::with_numbers;
-use crate::{Equations, MetricError, SecondLaw};
+use crate::{Equations, MetricError, Path, Paths, SecondLaw};
 
 /// A part of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +78,12 @@ pub trait Model: Equations {
         false
     }
 
+    /// Returns the paths of steps, if they are known. Without them steps follow the straight lines of a vector space with the canonical
+    /// metric, and the [lines of the charts](crate::ByCharts) elsewhere.
+    fn paths(&self) -> Option<&dyn Paths> {
+        None
+    }
+
     /// Returns whether derivatives are formed by differences, and so have two thirds of the digits.
     fn has_derivatives_by_differences(&self) -> bool {
         false
@@ -97,6 +103,34 @@ pub trait Model: Equations {
         })
     }
 
+    /// Evaluates the first and the second derivative of all laws along the [curve](Paths::curve) of a path, at a fraction of its way. The
+    /// default asks for the curve, and for each law along its velocity and its acceleration.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the path cannot be followed.
+    fn along_curve(
+        &self,
+        t: f64,
+        paths: (&dyn Paths, Path),
+        start: (&[f64], &[f64], f64),
+        to: &mut [[f64; 2]],
+    ) -> Result<(), MetricError> {
+        let (x, n) = (start.0, start.1.len());
+        with_numbers(x.len() + 2 * n, |room| {
+            let (y, room) = room.split_at_mut(x.len());
+            let (v, a) = room.split_at_mut(n);
+            paths.0.curve(paths.1, start, y, [&mut *v, &mut *a])?;
+            let turns = a.iter().any(|a| a.abs() > 0.0);
+            for (law, to) in to.iter_mut().enumerate() {
+                let [_, first, _, second] = self.along(law, t, y, [v, v]);
+                let bent = if turns { self.along(law, t, y, [a, a])[1] } else { 0.0 };
+                *to = [first, second + bent];
+            }
+            Ok(())
+        })
+    }
+
     /// Evaluates one law with its differential.
     fn jet(&self, law: usize, t: f64, x: &[f64], df: &mut [f64]) -> f64;
 
@@ -105,6 +139,28 @@ pub trait Model: Equations {
 
     /// Computes the differential of one law at `φ_x(q)`, in the chart at `x`.
     fn differential_at(&self, law: usize, t: f64, x: &[f64], q: &[f64], df: &mut [f64]);
+
+    /// Evaluates the Hessian of one law at `φ_x(q)`, in the chart at `x`. The default is that of differences of
+    /// [`differential_at`](Self::differential_at).
+    fn hessian_at(&self, law: usize, t: f64, x: &[f64], q: &[f64], hf: &mut [f64]) {
+        let n = q.len();
+        with_numbers(4 * n, |room| {
+            let (sizes, room) = room.split_at_mut(n);
+            let (at, room) = room.split_at_mut(n);
+            let (before, after) = room.split_at_mut(n);
+            self.scales(x, sizes);
+            let largest = sizes.iter().fold(f64::MIN_POSITIVE, |most, size| most.max(*size));
+            for j in 0..n {
+                let h = f64::EPSILON.cbrt() * if sizes[j] > 0.0 { sizes[j] } else { largest };
+                at.copy_from_slice(q);
+                at[j] = q[j] + h;
+                self.differential_at(law, t, x, at, after);
+                at[j] = q[j] - h;
+                self.differential_at(law, t, x, at, before);
+                (0..n).for_each(|i| hf[i * n + j] = (after[i] - before[i]) / (2.0 * h));
+            }
+        });
+    }
 
     /// Computes for each further invariant the smallest fraction of its differential that is independent of those of the laws
     /// before it.

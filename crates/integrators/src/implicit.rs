@@ -1,13 +1,15 @@
-//! Implicit methods of models in plain numbers, on vector spaces: the scheme of the paper, and methods with stages.
+//! Implicit methods of models in plain numbers: the scheme of the paper, and methods with stages.
 //!
 //! The equation of a step is that of [`crate::midpoint`] and of [`crate::collocation`]. It asks a [`Model`] for its laws and its
-//! parts, and knows neither its closures nor its types. Lists of numbers have a length that is known at run time, or when this
+//! parts, on a space that is not flat for its [paths](metriplectic_equations::Paths) and its metric, and knows neither its closures nor
+//! its types. Lists of numbers have a length that is known at run time, or when this
 //! library is compiled.
 
 mod algebra;
 mod collocation;
 mod drift;
 mod driven;
+mod metric;
 mod midpoint;
 mod motion;
 mod orthogonal;
@@ -17,7 +19,7 @@ mod start;
 mod velocity;
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::{Equations, Model};
+use metriplectic_equations::{Equations, Model, Path};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 pub(crate) use self::algebra::Matrix;
@@ -27,7 +29,7 @@ pub(crate) use self::midpoint::Midpoint;
 pub(crate) use self::midpoint::{FromEnd, MidpointNumbers, from_end};
 pub(crate) use self::motion::{LawAt, Motion, laws_at};
 pub(crate) use self::orthogonal::OrthogonalJet;
-pub(crate) use self::parts::{OfLaws, Parts, WithJacobian};
+pub(crate) use self::parts::{OfLaws, Parts, WithJacobian, is_flat};
 pub use self::refusal::NoImplicitSteps;
 pub(crate) use self::refusal::refuse;
 pub(crate) use self::start::accumulated;
@@ -150,8 +152,8 @@ impl<F: InLists> Stepper<F> for Midpoint {
     }
 
     fn serves(&self, flow: &F) -> Result<(), MethodError> {
-        let known = self.line.map(|_| ()).ok_or(NoImplicitSteps::Scheme);
-        known.and_then(|()| refuse(flow.system())).map_err(MethodError::new)
+        let known = self.line.ok_or(NoImplicitSteps::Scheme);
+        known.and_then(|line| refuse(flow.system(), line.path)).map_err(MethodError::new)
     }
 
     fn step(
@@ -204,7 +206,7 @@ impl<F: InLists> Stepper<F> for Collocation {
     }
 
     fn serves(&self, flow: &F) -> Result<(), MethodError> {
-        refuse(flow.system()).map_err(MethodError::new)
+        refuse(flow.system(), Path::Chart).map_err(MethodError::new)
     }
 
     fn step(
@@ -274,12 +276,12 @@ where
     R: Retraction<Euclidean<1>, Canonical>,
     W: DiscreteGradient,
 {
-    let line = R::BASE_OF_LINES.zip(W::KIND);
-    let line = line.map(|(base, gradient)| LineOfStep { base, gradient });
+    let line = R::PATH.zip(W::KIND);
+    let line = line.map(|(path, gradient)| LineOfStep { path, gradient });
     Midpoint { name: scheme_name::<R, W>, line, newton, splits }
 }
 
-/// The scheme of a system of one's own. A step asks its [model](Equations::model), along the straight lines of a vector space.
+/// The scheme of a system of one's own. A step asks its [model](Equations::model).
 impl<S: Equations, R, W> Stepper<FromEquations<S>> for Scheme<R, W>
 where
     R: Retraction<Euclidean<1>, Canonical>,
@@ -322,7 +324,7 @@ macro_rules! of_stages {
             }
         }
 
-        /// The method for a system of one's own. A step asks its [model](Equations::model), on a vector space.
+        /// The method for a system of one's own. A step asks its [model](Equations::model).
         impl<S: Equations, const STAGES: usize> Stepper<FromEquations<S>> for $name<STAGES> {
             type Memory = StageNumbers<AtRunTime>;
 

@@ -1,20 +1,21 @@
 //! A lattice as a system in plain numbers, of which implicit methods take steps with Jacobians of all pairs of variables.
 //!
 //! The entries are those of the points, site by site. The Jacobians are formed by [`Differences`], because friction is a closure of
-//! numbers without derivatives; the equation of a step needs none, so both laws are exact. Sites live on a vector space.
+//! numbers without derivatives; the equation of a step needs none, so both laws are exact. The [paths](crate::paths) of steps are those of
+//! the sites.
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_equations::{
-    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, PointError, Sizes,
+    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, Paths, PointError, Sizes,
 };
-use metriplectic_fields::{Column, Space as _};
+use metriplectic_fields::{Column as _, Space as _};
 use metriplectic_integrators::{
     Control, DiscreteGradient, Element, Flow, FromEquations, Gauss, Laws, Listed as _, MethodError,
-    NoImplicitSteps, Promises, Radau, Refusal, Scheme, StageFlow as _, StepEnds, StepError,
-    StepStart, Stepper, Taken, Values, Vector as _,
+    Promises, Radau, Refusal, Scheme, StageFlow as _, StepEnds, StepError, StepStart, Stepper,
+    Taken, Values, Vector as _,
 };
-use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
+use metriplectic_manifolds::{Canonical, Euclidean, Manifold as _, Retraction};
 
 use crate::flow::listed;
 use crate::lattice::{Lattice, differentials_at, dimension};
@@ -45,8 +46,14 @@ pub(crate) fn put<P: Model>(v: &VectorOf<P>, site: usize, numbers: &mut [f64]) {
 
 impl<P: Model> Equations for Dense<'_, P> {
     fn sizes(&self) -> Sizes {
-        let entries = self.0.sites() * dimension::<P>();
-        Sizes { entries, directions: entries, laws: ENTROPY + 1 + P::SUMS }
+        let mut length = 0;
+        P::Manifold::assemble(&mut || {
+            length += 1;
+            1.0
+        });
+        let of_all = |length: usize| self.0.sites() * length;
+        let (entries, directions) = (of_all(length), of_all(dimension::<P>()));
+        Sizes { entries, directions, laws: ENTROPY + 1 + P::SUMS }
     }
 
     fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
@@ -56,7 +63,7 @@ impl<P: Model> Equations for Dense<'_, P> {
     }
 
     fn differentials(&self, _: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
-        let (n, x) = (x.len(), listed(x));
+        let (n, x) = (self.0.sites() * dimension::<P>(), listed(x));
         let jets = self.0.jets(&x);
         let laws = jets.laws();
         (values[ENERGY], values[ENTROPY]) = (laws.energy, laws.entropy);
@@ -93,9 +100,42 @@ impl<P: Model> Equations for Dense<'_, P> {
     fn defect(&self, x: &[f64]) -> f64 {
         self.0.defect(&listed(x))
     }
+
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        for (site, x) in listed::<P::Manifold>(x).iter().enumerate() {
+            put::<P>(&P::Manifold::scales(x), site, sizes);
+        }
+    }
+
+    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+        let mut y = y.iter_mut();
+        for (site, x) in listed::<P::Manifold>(x).iter().enumerate() {
+            let end = P::Manifold::chart(x, &column::<P>(q, site));
+            P::Manifold::write(&end, &mut |entry| {
+                *y.next().expect("a slice has the entries of a state") = entry;
+            });
+        }
+    }
+
+    fn coordinates(&self, x: &[f64], y: &[f64], to: &mut [f64]) -> bool {
+        let (x, y) = (listed::<P::Manifold>(x), listed::<P::Manifold>(y));
+        (0..self.0.sites()).fold(true, |is_near, site| {
+            let q: VectorOf<P> = P::Manifold::coordinates(&x[site], &y[site]);
+            put::<P>(&q, site, to);
+            is_near && q.is_finite() && P::Manifold::is_near(&q)
+        })
+    }
 }
 
 impl<P: Model> Apart for Dense<'_, P> {
+    fn has_charts(&self) -> bool {
+        !P::Manifold::IS_VECTOR_SPACE
+    }
+
+    fn paths(&self) -> Option<&dyn Paths> {
+        Some(self)
+    }
+
     fn is_zero(&self, part: Part) -> bool {
         match part {
             Part::Reversible => !self.0.parts.has_bracket(),
@@ -219,9 +259,6 @@ macro_rules! implicit {
             }
 
             fn serves(&self, lattice: &Lattice<P>) -> Result<(), MethodError> {
-                if !P::Manifold::IS_VECTOR_SPACE {
-                    return Err(MethodError::new(NoImplicitSteps::Space));
-                }
                 in_numbers(lattice, |flow| self.serves(flow))
             }
 

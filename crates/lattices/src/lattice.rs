@@ -26,8 +26,8 @@ pub(crate) use motion::probed;
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
 /// at both; built by [`Lattice::on`].
 ///
-/// It is a [`Flow`](metriplectic_integrators::Flow), and the explicit methods run it. Where sites live on a vector space and all of them have up
-/// to 1024 variables, the schemes, `Gauss` and `Radau` run it too, with Jacobians of all pairs of variables.
+/// It is a [`Flow`](metriplectic_integrators::Flow), and the explicit methods run it. Where all sites have up to 1024 variables,
+/// the schemes, `Gauss` and `Radau` run it too, with Jacobians of all pairs of variables, along the lines of the charts of the sites.
 pub struct Lattice<P> {
     pub(crate) parts: P,
     pub(crate) layout: Layout,

@@ -53,6 +53,7 @@ pub mod open;
 mod parallel;
 #[cfg(test)]
 mod parts;
+mod paths;
 pub mod points;
 mod pool;
 pub mod profiles;

@@ -37,7 +37,7 @@ pub use vector::OpenSiteVector;
 
 /// A [`Lattice`] with ports and baths at some of its sites; made by [`Lattice::opened`].
 ///
-/// The explicit methods run it. So do the schemes, `Gauss` and `Radau` on vector spaces of up to 1024 variables; `Radau` takes a lattice
+/// The explicit methods run it. So do the schemes, `Gauss` and `Radau` with up to 1024 variables; `Radau` takes a lattice
 /// without an entropy of its own and with one bath.
 ///
 /// ```

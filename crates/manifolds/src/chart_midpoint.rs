@@ -1,5 +1,6 @@
 //! The symmetric retraction along straight lines of the chart.
 
+use metriplectic_equations::Path;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Real, Scalar, Square, Vector};
 use num_dual::{Dual, Dual64};
 
@@ -43,7 +44,7 @@ fn beyond<M: Manifold>(u: &Vector<M>) -> MetricError {
 }
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for ChartMidpoint {
-    const BASE_OF_LINES: Option<f64> = Some(0.5);
+    const PATH: Option<Path> = Some(Path::Chart);
 
     fn step_path<D: Scalar>(
         &self,

@@ -1,5 +1,6 @@
 //! The Riemannian exponential as a retraction: base point at the start.
 
+use metriplectic_equations::Path;
 use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square, Vector};
 
 use crate::{
@@ -18,7 +19,7 @@ use crate::{
 pub struct Exponential;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
-    const BASE_OF_LINES: Option<f64> = Some(0.0);
+    const PATH: Option<Path> = Some(Path::Exponential);
 
     #[inline]
     fn step_path<D: Scalar>(

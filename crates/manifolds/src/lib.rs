@@ -47,7 +47,9 @@ pub mod flat;
 mod geodesic;
 mod geodesic_jet;
 pub mod half_line;
-pub mod inert;
+#[doc(hidden)]
+pub mod in_numbers;
+mod inert;
 pub mod inner_product;
 pub mod laws;
 pub mod lie_algebra;

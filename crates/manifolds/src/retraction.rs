@@ -1,6 +1,7 @@
 //! Retractions, which map a tangent vector to a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
+use metriplectic_equations::Path;
 use metriplectic_fields::{Column, Real, Scalar, Space, Vector};
 
 use crate::{Manifold, MetricError, Riemannian};
@@ -16,10 +17,9 @@ pub use crate::step_path::{StepPath, StepPathJet};
 /// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric retraction
 /// returns the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// Says where its base point is on the straight lines of a vector space with the canonical metric, as a fraction of the way, if
-    /// its paths are these lines there.
+    /// Names it, if it is one of this library.
     #[doc(hidden)]
-    const BASE_OF_LINES: Option<f64> = None;
+    const PATH: Option<Path> = None;
 
     /// Follows the path that leaves `x` with initial displacement `u ∈ T_xM`, the unknown of a step.
     ///

@@ -1,5 +1,6 @@
 //! The symmetric retraction: base point in the middle of the geodesic.
 
+use metriplectic_equations::Path;
 use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
 use crate::retraction::half;
@@ -18,7 +19,7 @@ use crate::{
 pub struct WeylMidpoint;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
-    const BASE_OF_LINES: Option<f64> = Some(0.5);
+    const PATH: Option<Path> = Some(Path::Weyl);
 
     #[inline]
     fn step_path<D: Scalar>(

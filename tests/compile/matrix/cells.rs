@@ -231,12 +231,12 @@ pub(crate) const TESTS: &[Reference] = &[
             "tests/lattices/implicit.rs",
             "implicit_methods_of_a_chain_have_their_orders_and_both_laws",
         ],
-        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
+        "up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     partly(
         "dense open",
         ["tests/lattices/open_implicit.rs", "sites_and_ledger_have_the_order_of_each_method"],
-        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
+        "up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     partly(
         "dense bath",
@@ -244,19 +244,20 @@ pub(crate) const TESTS: &[Reference] = &[
             "tests/lattices/open_implicit.rs",
             "radau_gives_what_it_damps_to_the_only_bath_or_refuses",
         ],
-        "with sites on vector spaces and up to 1024 variables (others: `NoImplicitSteps`), \
+        "up to 1024 variables (others: `NoImplicitSteps`), \
          [without an entropy of their own and with one bath](open_systems.md#what-is-not-promised) (others: `NotDamped`)",
     ),
     right("warm sites", "tests/lattices/open_noise.rs", "bodies_in_a_room_have_the_law_of_gibbs"),
     partly(
         "dense path",
         ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],
-        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
+        "up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     partly(
         "by parts",
         ["crates/integrators/src/implicit.rs", "a_system_in_numbers_takes_the_steps_of_its_types"],
-        "on vector spaces, if the parts of the system are [known apart](recipes.md#a-system-of-your-own), \
+        "if the parts of the system are [known apart](recipes.md#a-system-of-your-own), along \
+         geodesics if these are known too, \
          and up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),

@@ -7,6 +7,7 @@ use metriplectic_equations::judge::{
     Derivatives, Mismatch, OF_SOLUTIONS, RADIUS, Row, coordinate_scales, draw,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension as _, Real, ScalarField, Space, Vector};
+use metriplectic_manifolds::in_numbers::point;
 use metriplectic_manifolds::{Manifold, MetricError};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -14,7 +15,7 @@ use rand::rngs::ChaCha8Rng;
 use super::drift::{Place, TermVisitor};
 use super::system::Jets;
 use super::terms::NoiseTerm;
-use crate::in_numbers::{InNumbers, point};
+use crate::in_numbers::InNumbers;
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::velocity::differentials;
 

@@ -224,6 +224,17 @@ impl<L: Lengths> Matrix<L> {
         product
     }
 
+    /// A function of each column.
+    pub(super) fn map_columns(&self, f: impl Fn(&L::Vector) -> L::Vector) -> Self {
+        let n = self.n();
+        let mut matrix = Self::zeros(n);
+        for k in 0..n {
+            let column = f(&vector(n, |i| self[(i, k)]));
+            (0..n).for_each(|i| matrix[(i, k)] = column[i]);
+        }
+        matrix
+    }
+
     /// `tr A²`.
     pub(super) fn trace_of_square(&self) -> f64 {
         let n = self.n();

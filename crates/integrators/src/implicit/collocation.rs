@@ -1,4 +1,4 @@
-//! Methods with stages for a model in plain numbers, on a vector space.
+//! Methods with stages for a model in plain numbers.
 
 #![allow(
     clippy::needless_range_loop,

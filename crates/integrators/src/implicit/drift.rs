@@ -1,7 +1,7 @@
 //! Correction of the round-off that earlier steps have accumulated in the laws, as in [`crate::round_off::drift`], whose formulas it
 //! has.
 
-use metriplectic_equations::Part;
+use metriplectic_equations::{Part, Path};
 
 use super::algebra::{add, dot};
 use super::parts::Parts;
@@ -42,7 +42,11 @@ pub(super) fn target<L: Lengths>(start: &Start<'_, L>, d: &L::Vector) -> Laws<L:
     };
     let pi = linearised(Part::Reversible, parts.moves, &w.energy);
     let k = linearised(Part::Irreversible, parts.rubs, &w.entropy);
-    let (Some(pi), Some(k)) = (pi, k) else { return nothing::<L>(values) };
+    let (Some(pi), Some(k), Some(metric)) = (pi, k, parts.metric(x)) else {
+        return nothing::<L>(values);
+    };
+    let flat = metric.units().flat(d);
+    let sizes_of_flat = parts.vector(|i| flat[i].abs());
     let mut sensitivity = pi.map_or_else(|| parts.zeros(), |pi| pi.tensor.abs());
     if let Some(k) = &k {
         sensitivity.add(1.0, &k.along_w.abs());
@@ -53,13 +57,13 @@ pub(super) fn target<L: Lengths>(start: &Start<'_, L>, d: &L::Vector) -> Laws<L:
     let length = parts.vector(|i| d[i].abs());
     let size = |df: &L::Vector| parts.vector(|i| df[i].abs());
     // Σ|∂_iF δ_i|/|e| for a δ by a tensor.
-    let moved = |df: &L::Vector, by: &L::Vector| dot(&size(df), by) * start.h.abs() / dot(d, d);
+    let moved = |df: &L::Vector, by: &L::Vector| dot(&size(df), by) * start.h.abs() / dot(&flat, d);
     let fraction = |e: f64, law: f64, df: &L::Vector, sensitivity: f64| {
         let r = dot(&size(df), &length) / (1e2 * sensitivity * e.abs());
         if far(e, law) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
-    let of_energy = moved(&w.energy, &sensitivity.times(&length));
-    let by_friction = k.map_or_else(|| parts.zero(), |k| k.tensor.abs_times(&length));
+    let of_energy = moved(&w.energy, &sensitivity.times(&sizes_of_flat));
+    let by_friction = k.map_or_else(|| parts.zero(), |k| k.tensor.abs_times(&sizes_of_flat));
     let of_entropy = 1.0 + moved(&w.entropy, &by_friction);
     let mut drift = nothing::<L>(values);
     drift.energy = fraction(*energy, values.energy.abs(), &w.energy, of_energy);
@@ -99,13 +103,14 @@ impl<L: Lengths> Compensation<L> {
     pub(super) fn add(
         &mut self,
         parts: &Parts<'_, L>,
+        path: Path,
         [x, end]: [&L::State; 2],
         d: &L::Vector,
     ) -> Option<L::State> {
-        let mut lost = parts.lost_digits(x, d, end);
+        let mut lost = parts.lost_digits(path, [x, end], d);
         let compensated = self.before().map(|before| {
             let compensated = parts.moved(end, before);
-            let more = parts.lost_digits(end, before, &compensated);
+            let more = parts.lost_digits(path, [end, &compensated], before);
             add(&mut lost, 1.0, &more);
             compensated
         });

@@ -1,4 +1,4 @@
-//! The scheme of the paper for a model in plain numbers, on a vector space.
+//! The scheme of the paper for a model in plain numbers.
 
 mod equation;
 mod fallbacks;

@@ -4,6 +4,7 @@
 use smallvec::SmallVec;
 
 use super::algebra::{Matrix, add, dot, magnitude, vector};
+use super::metric::{MetricAlong, Units};
 use super::parts::WithJacobian;
 use crate::numbers::{Lengths, List};
 use crate::round_off::bound::INDEPENDENT;
@@ -15,52 +16,12 @@ fn faded(square: f64, size: f64, mu: f64) -> f64 {
     square + square * (size / square * (mu * mu)).powi(2)
 }
 
-/// Units in which the components of covectors are orthonormal: the canonical ones, or sizes `s` with
-/// `G(u, v) = Σ u_i v_i / s_i²`.
-#[derive(Debug)]
-pub(super) enum Units<'a, V> {
-    /// Of the canonical inner product.
-    Canonical,
-    /// Of these sizes.
-    Sizes(&'a V),
-}
-
-// By hand, because vectors have none.
-impl<V> Clone for Units<'_, V> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<V> Copy for Units<'_, V> {}
-
-impl<V: List> Units<'_, V> {
-    /// A covector in orthonormal components, or a vector from them.
-    #[inline]
-    fn orthonormal(&self, alpha: &V) -> V {
-        match self {
-            Self::Canonical => alpha.clone(),
-            Self::Sizes(sizes) => {
-                let (alpha, sizes) = (alpha.numbers(), sizes.numbers());
-                vector(alpha.len(), |i| alpha[i] * sizes[i])
-            }
-        }
-    }
-
-    /// The vector `♯α`.
-    #[inline]
-    pub(super) fn sharp(&self, alpha: &V) -> V {
-        self.orthonormal(&self.orthonormal(alpha))
-    }
-}
-
 /// A covector made orthogonal, and what projections off it need.
-#[derive(Clone)]
-struct Normal<V> {
+struct Normal<L: Lengths> {
     /// The covector `n`.
-    n: V,
+    n: L::Vector,
     /// The vector `♯n`.
-    sharp: V,
+    sharp: L::Vector,
     /// `G*(n, n)`.
     square: f64,
     /// `G*(w, w)` of the covector `w` whose orthogonal part is `n`.
@@ -68,10 +29,9 @@ struct Normal<V> {
 }
 
 /// Covectors made orthogonal to each other.
-#[derive(Clone)]
-pub(super) struct Orthogonal<V>(SmallVec<[Normal<V>; 2]>);
+pub(super) struct Orthogonal<L: Lengths>(SmallVec<[Normal<L>; 2]>);
 
-impl<V: List> Orthogonal<V> {
+impl<L: Lengths> Orthogonal<L> {
     pub(super) fn none() -> Self {
         Self(SmallVec::new())
     }
@@ -82,7 +42,7 @@ impl<V: List> Orthogonal<V> {
     }
 
     /// Adds a covector. If the fraction of it that is orthogonal to those before it is round-off, it is omitted.
-    pub(super) fn push(&mut self, g: Units<'_, V>, w: &V) {
+    pub(super) fn push(&mut self, g: Units<'_, L>, w: &L::Vector) {
         let whole = g.orthonormal(w);
         // The second pass removes the rounding error of the first.
         let n = self.project_covector(0, &self.project_covector(0, w));
@@ -91,13 +51,13 @@ impl<V: List> Orthogonal<V> {
         let fraction = if size > 0.0 { magnitude(&hat) / size } else { 0.0 };
         if fraction > INDEPENDENT && self.0.len() < w.numbers().len() {
             let (square, size) = (dot(&hat, &hat), dot(&whole, &whole));
-            self.0.push(Normal { n, sharp: g.orthonormal(&hat), square, size });
+            self.0.push(Normal { n, sharp: g.with_components(&hat), square, size });
         }
     }
 
     /// Projects a covector: `Pᵀα`, without its parts along the covectors from the `first` on.
     #[inline]
-    pub(super) fn project_covector(&self, first: usize, alpha: &V) -> V {
+    pub(super) fn project_covector(&self, first: usize, alpha: &L::Vector) -> L::Vector {
         let mut alpha = alpha.clone();
         for Normal { n, sharp, square, .. } in &self.0[first..] {
             let c = dot(sharp, &alpha) / *square;
@@ -108,7 +68,7 @@ impl<V: List> Orthogonal<V> {
 
     /// Projects a vector: `Pv`, which the covectors from the `first` on annihilate.
     #[inline]
-    pub(super) fn project_vector(&self, first: usize, v: &V) -> V {
+    pub(super) fn project_vector(&self, first: usize, v: &L::Vector) -> L::Vector {
         let mut v = v.clone();
         for Normal { n, sharp, square, .. } in &self.0[first..] {
             let c = dot(n, &v) / *square;
@@ -119,7 +79,7 @@ impl<V: List> Orthogonal<V> {
 
     /// [`project_covector`](Self::project_covector) with projections that fade out below the fraction `mu`.
     #[inline]
-    pub(super) fn faded_covector(&self, first: usize, alpha: &V, mu: f64) -> V {
+    pub(super) fn faded_covector(&self, first: usize, alpha: &L::Vector, mu: f64) -> L::Vector {
         let mut alpha = alpha.clone();
         for Normal { n, sharp, square, size } in &self.0[first..] {
             let c = dot(sharp, &alpha) / faded(*square, *size, mu);
@@ -130,7 +90,7 @@ impl<V: List> Orthogonal<V> {
 
     /// [`project_vector`](Self::project_vector) with projections that fade out below the fraction `mu`.
     #[inline]
-    pub(super) fn faded_vector(&self, first: usize, v: &V, mu: f64) -> V {
+    pub(super) fn faded_vector(&self, first: usize, v: &L::Vector, mu: f64) -> L::Vector {
         let mut v = v.clone();
         for Normal { n, sharp, square, size } in &self.0[first..] {
             let c = dot(n, &v) / faded(*square, *size, mu);
@@ -141,7 +101,13 @@ impl<V: List> Orthogonal<V> {
 
     /// Adds the covector `w`, and returns the vector `v − ⟨w, v⟩ ♯n/G*(n, n)` with the part `n` of `w` that is orthogonal to
     /// the covectors before it. Fades out below the fraction `mu`.
-    pub(super) fn without(&mut self, g: Units<'_, V>, w: &V, v: V, mu: f64) -> V {
+    pub(super) fn without(
+        &mut self,
+        g: Units<'_, L>,
+        w: &L::Vector,
+        v: L::Vector,
+        mu: f64,
+    ) -> L::Vector {
         let len = self.0.len();
         self.push(g, w);
         let mut v = v;
@@ -153,12 +119,21 @@ impl<V: List> Orthogonal<V> {
     }
 }
 
-/// [`Orthogonal`] in the canonical inner product, where every quantity has its derivatives along the unknown of a step.
+/// What is projected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Of {
+    Vector,
+    Covector,
+}
+
+/// [`Orthogonal`], where every quantity has its derivatives along the unknown of a step.
 pub(crate) struct OrthogonalJet<L: Lengths>(SmallVec<[NormalJet<L>; 1]>);
 
 struct NormalJet<L: Lengths> {
-    /// The covector `n`, which is `♯n` as well.
+    /// The covector `n`.
     n: WithJacobian<L>,
+    /// The vector `♯n`, if it is another one.
+    sharp: Option<WithJacobian<L>>,
     square: Number<L>,
     size: Number<L>,
 }
@@ -176,6 +151,11 @@ impl<L: Lengths> Clone for Number<L> {
 }
 
 impl<L: Lengths> NormalJet<L> {
+    #[inline]
+    fn sharp(&self) -> &WithJacobian<L> {
+        self.sharp.as_ref().unwrap_or(&self.n)
+    }
+
     /// [`faded`] with derivatives: with `σ² = square/size` it is `d(square/w) = (1 − r) d square + 2 r σ² d size`.
     fn faded(&self, mu: f64) -> Number<L> {
         let Self { square, size, .. } = self;
@@ -195,6 +175,17 @@ fn square<L: Lengths>(w: &WithJacobian<L>) -> Number<L> {
     let mut slope = w.slope.transpose_times(&w.value);
     slope.numbers_mut().iter_mut().for_each(|slope| *slope *= 2.0);
     Number { value: dot(&w.value, &w.value), slope }
+}
+
+/// The square `G*(n, n)` of a covector with this vector `♯n`, and its derivatives: `∂(n·g⁻¹n) = 2 ♯n·∂n − ♯n·(∂g)♯n`.
+fn square_in<L: Lengths>(
+    g: &MetricAlong<'_, L>,
+    n: &WithJacobian<L>,
+    sharp: &L::Vector,
+) -> Number<L> {
+    let (first, second) = (n.slope.transpose_times(sharp), g.of_flat(sharp).transpose_times(sharp));
+    let slope = vector(first.numbers().len(), |i| 2.0 * first[i] - second[i]);
+    Number { value: dot(sharp, &n.value), slope }
 }
 
 /// `v − along (functional·v)/square`, where the quotient has derivatives too.
@@ -239,58 +230,104 @@ impl<L: Lengths> OrthogonalJet<L> {
             .sum()
     }
 
-    /// Adds to `terms` the absolute terms that the projection of a vector or covector off the covectors from the `first` on
+    /// Adds to `terms` the absolute terms that the projection of a vector, or of a covector, off the covectors from the `first` on
     /// subtracts, if it fades out below the fraction `mu`, times a factor.
     pub(super) fn add_terms(
         &self,
         first: usize,
-        v: &L::Vector,
+        (v, of): (&L::Vector, Of),
         mu: f64,
         (terms, factor): (&mut L::Vector, f64),
     ) {
-        for NormalJet { n, square, size } in &self.0[first..] {
+        for normal in &self.0[first..] {
+            let NormalJet { n, square, size, .. } = normal;
+            let [functional, along] = match of {
+                Of::Vector => [n, normal.sharp()],
+                Of::Covector => [normal.sharp(), n],
+            };
             let square = faded(square.value, size.value, mu);
-            let pairs = n.value.numbers().iter().zip(v.numbers());
+            let pairs = functional.value.numbers().iter().zip(v.numbers());
             let c = pairs.fold(0.0, |sum, (n, v)| sum + n.abs() * v.abs()) / square;
-            let to = terms.numbers_mut().iter_mut().zip(n.value.numbers());
+            let to = terms.numbers_mut().iter_mut().zip(along.value.numbers());
             to.for_each(|(to, n)| *to += n.abs() * c * factor);
         }
     }
 
-    /// Adds a covector.
+    /// Adds a covector, in the canonical metric.
     pub(crate) fn push(&mut self, w: &WithJacobian<L>) {
-        let n = self.projected(0, &self.projected(0, w));
+        let n = self.covector(0, &self.covector(0, w));
         let most = w.value.numbers().len();
         if magnitude(&n.value) > INDEPENDENT * magnitude(&w.value) && self.0.len() < most {
             let of_n = square(&n);
             let size = if self.0.is_empty() { of_n.clone() } else { square(w) };
-            self.0.push(NormalJet { n, square: of_n, size });
+            self.0.push(NormalJet { n, sharp: None, square: of_n, size });
         }
     }
 
-    /// Projects a vector or a covector off the covectors from the `first` on.
-    pub(crate) fn projected(&self, first: usize, v: &WithJacobian<L>) -> WithJacobian<L> {
-        let normals = self.0[first..].iter();
-        normals.fold(v.clone(), |v, NormalJet { n, square, .. }| without(&v, n, n, square))
+    /// Adds a covector, in a metric; without one it is the canonical.
+    pub(super) fn push_in(&mut self, g: Option<&MetricAlong<'_, L>>, w: &WithJacobian<L>) {
+        let Some(g) = g else { return self.push(w) };
+        let n = self.covector(0, &self.covector(0, w));
+        let [hat, whole] = [&n, w].map(|w| g.factored.orthonormal(&w.value));
+        let most = w.value.numbers().len();
+        if magnitude(&hat) > INDEPENDENT * magnitude(&whole) && self.0.len() < most {
+            let value = g.factored.with_components(&hat);
+            // g ♯n = n, so g ∂♯n = ∂n − (∂g) ♯n.
+            let mut bend = n.slope.clone();
+            bend.add(-1.0, &g.of_flat(&value));
+            let slope = bend.map_columns(|column| g.factored.sharp(column));
+            let of_n = square_in(g, &n, &value);
+            let size = if self.0.is_empty() {
+                of_n.clone()
+            } else {
+                square_in(g, w, &g.factored.with_components(&whole))
+            };
+            let sharp = Some(WithJacobian { value, slope });
+            self.0.push(NormalJet { n, sharp, square: of_n, size });
+        }
     }
 
-    /// [`projected`](Self::projected) with projections that fade out below the fraction `mu`.
-    pub(super) fn faded(&self, first: usize, v: &WithJacobian<L>, mu: f64) -> WithJacobian<L> {
+    /// Projects a vector off the covectors from the `first` on.
+    pub(crate) fn vector(&self, first: usize, v: &WithJacobian<L>) -> WithJacobian<L> {
         let normals = self.0[first..].iter();
-        normals.fold(v.clone(), |v, normal| without(&v, &normal.n, &normal.n, &normal.faded(mu)))
+        normals.fold(v.clone(), |v, normal| without(&v, normal.sharp(), &normal.n, &normal.square))
+    }
+
+    /// Projects a covector.
+    pub(crate) fn covector(&self, first: usize, w: &WithJacobian<L>) -> WithJacobian<L> {
+        let normals = self.0[first..].iter();
+        normals.fold(w.clone(), |w, normal| without(&w, &normal.n, normal.sharp(), &normal.square))
+    }
+
+    /// [`vector`](Self::vector) or [`covector`](Self::covector) with projections that fade out below the fraction `mu`.
+    pub(super) fn faded(
+        &self,
+        first: usize,
+        (v, of): (&WithJacobian<L>, Of),
+        mu: f64,
+    ) -> WithJacobian<L> {
+        let normals = self.0[first..].iter();
+        normals.fold(v.clone(), |v, normal| {
+            let [along, functional] = match of {
+                Of::Vector => [normal.sharp(), &normal.n],
+                Of::Covector => [&normal.n, normal.sharp()],
+            };
+            without(&v, along, functional, &normal.faded(mu))
+        })
     }
 
     /// [`Orthogonal::without`] with derivatives.
     pub(super) fn without(
         &mut self,
+        g: Option<&MetricAlong<'_, L>>,
         w: &WithJacobian<L>,
         v: WithJacobian<L>,
         mu: f64,
     ) -> WithJacobian<L> {
         let len = self.0.len();
-        self.push(w);
+        self.push_in(g, w);
         match self.0.get(len) {
-            Some(normal) => without(&v, &normal.n, w, &normal.faded(mu)),
+            Some(normal) => without(&v, normal.sharp(), w, &normal.faded(mu)),
             None => v,
         }
     }

@@ -1,13 +1,28 @@
-//! A model in plain numbers, as implicit methods ask it: on a vector space, in the canonical inner product of its coordinates.
+//! A model in plain numbers, as implicit methods ask it.
+//!
+//! On a vector space with the canonical metric nothing of the space is asked for: charts are translations, and paths straight lines.
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
-use metriplectic_equations::{self as equations, ENERGY, ENTROPY, Jet, Model, Part, Sizes};
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{
+    self as equations, ByCharts, ENERGY, ENTROPY, Jet, Model, Part, Path, PathAt, PathSlopes,
+    Paths, Sizes,
+};
 
-use super::algebra::{Matrix, vector};
+use smallvec::{SmallVec, smallvec};
+
+use super::algebra::{Matrix, sum_of_terms, vector};
+use super::metric::Metric;
 use crate::numbers::{Lengths, List};
 use crate::step::Laws;
 use crate::system::NO_CLOCK;
+
+/// Returns whether the charts of a model are translations, and its paths straight lines.
+pub(crate) fn is_flat(model: &dyn Model) -> bool {
+    let Sizes { entries, directions, .. } = model.sizes();
+    model.is_vector_space() && entries == directions && model.has_canonical_metric()
+}
 
 /// One number, vector or law for each field.
 #[derive(Clone, Debug)]
@@ -29,6 +44,16 @@ impl<V> OfLaws<V> {
             entropy: f(&self.entropy),
             invariants: self.invariants.iter().map(f).collect(),
         }
+    }
+}
+
+impl<V> OfLaws<Option<V>> {
+    /// Each of them, if there are all.
+    #[inline]
+    pub(crate) fn all(self) -> Option<OfLaws<V>> {
+        let Self { energy, entropy, invariants } = self;
+        let invariants = invariants.into_iter().collect::<Option<_>>()?;
+        Some(OfLaws { energy: energy?, entropy: entropy?, invariants })
     }
 }
 
@@ -60,9 +85,31 @@ pub(super) struct PartJet<L: Lengths> {
     pub(super) tensor: Matrix<L>,
 }
 
+/// The paths of steps on a space that is not flat.
+#[derive(Clone, Copy)]
+enum Curved<'a> {
+    /// Those of the model.
+    Known(&'a dyn Paths),
+    /// The lines of its charts.
+    ByCharts(ByCharts<'a>),
+}
+
+/// The path of a step on a space that is not flat.
+pub(super) struct CurvedPath<L: Lengths> {
+    pub(super) z: L::State,
+    pub(super) d: L::Vector,
+    pub(super) end: L::State,
+    /// The derivatives `∂z`, `∂d` and `∂x'` along the unknown, if they were asked for.
+    pub(super) slopes: Option<[Matrix<L>; 3]>,
+}
+
 /// A model, with the answers that do not change.
 pub(crate) struct Parts<'a, L: Lengths> {
     model: &'a dyn Model,
+    /// What the model says of its space, if that is not flat.
+    curved: Option<Curved<'a>>,
+    has_metric: bool,
+    entries: usize,
     /// The time of its force, which nothing else depends on.
     time: f64,
     count: usize,
@@ -83,10 +130,17 @@ pub(crate) struct Parts<'a, L: Lengths> {
 
 impl<'a, L: Lengths> Parts<'a, L> {
     pub(crate) fn of(model: &'a dyn Model) -> Self {
-        let Sizes { directions, laws, .. } = model.sizes();
+        let Sizes { entries, directions, laws } = model.sizes();
+        let has_metric = !model.has_canonical_metric();
+        let is_flat = is_flat(model);
+        let by_charts = || Curved::ByCharts(ByCharts(model));
+        let curved = (!is_flat).then(|| model.paths().map_or_else(by_charts, Curved::Known));
         let further = if L::HAS_INVARIANTS { laws.saturating_sub(ENTROPY + 1) } else { 0 };
         Self {
             model,
+            curved,
+            has_metric,
+            entries,
             time: NO_CLOCK,
             count: directions,
             kinds: (0..further).map(|k| model.kind(k)).collect(),
@@ -148,28 +202,208 @@ impl<'a, L: Lengths> Parts<'a, L> {
         }
     }
 
-    /// The state `x + q`.
+    /// What the model says of its space, if that is not flat.
+    #[inline]
+    fn paths(&self) -> Option<&dyn Paths> {
+        if const { L::IS_FLAT } {
+            return None;
+        }
+        self.curved.as_ref().map(|curved| match curved {
+            Curved::Known(paths) => *paths,
+            Curved::ByCharts(paths) => paths,
+        })
+    }
+
+    /// Whether charts are translations, and paths straight lines.
+    #[inline]
+    pub(super) const fn is_flat(&self) -> bool {
+        if const { L::IS_FLAT } { true } else { self.curved.is_none() }
+    }
+
+    fn state(&self) -> L::State {
+        L::State::room(|| self.entries)
+    }
+
+    /// The state `φ_x(q)`.
     #[inline]
     pub(super) fn moved(&self, x: &L::State, q: &L::Vector) -> L::State {
-        vector(self.n(), |i| x.numbers()[i] + q[i])
+        if self.is_flat() {
+            return vector(self.n(), |i| x.numbers()[i] + q[i]);
+        }
+        let mut y = self.state();
+        self.model.chart(x.numbers(), q.numbers(), y.numbers_mut());
+        y
     }
 
-    /// The displacement `y − x`.
+    /// The displacement `φ_x⁻¹(y)`.
     #[inline]
     pub(super) fn between(&self, x: &L::State, y: &L::State) -> L::Vector {
-        self.vector(|i| y.numbers()[i] - x.numbers()[i])
+        if self.is_flat() {
+            return self.vector(|i| y.numbers()[i] - x.numbers()[i]);
+        }
+        let mut q = self.zero();
+        let _ = self.model.coordinates(x.numbers(), y.numbers(), q.numbers_mut());
+        q
     }
 
-    /// The sizes `|x_i|` of the entries.
+    /// Returns whether a state is well inside of the chart at another one.
+    pub(super) fn is_near(&self, x: &L::State, y: &L::State) -> bool {
+        let mut q = self.zero();
+        self.model.coordinates(x.numbers(), y.numbers(), q.numbers_mut())
+    }
+
+    /// Returns whether a state is outside of the space.
+    pub(super) fn is_outside(&self, x: &L::State) -> bool {
+        self.model.defect(x.numbers()).is_infinite()
+    }
+
+    /// The sizes of the entries, one for each direction.
     #[inline]
     pub(super) fn scales(&self, x: &L::State) -> L::Vector {
-        self.vector(|i| x.numbers()[i].abs())
+        if self.is_flat() {
+            return self.vector(|i| x.numbers()[i].abs());
+        }
+        let mut sizes = self.zero();
+        self.model.scales(x.numbers(), sizes.numbers_mut());
+        sizes
     }
 
-    /// Computes the rounding error of the displacement `d` on the way from `x` to `end`.
+    /// Computes the rounding error of the displacement `d` on the way from `x` to the `end` of its path.
     #[inline]
-    pub(super) fn lost_digits(&self, x: &L::State, d: &L::Vector, end: &L::State) -> L::Vector {
-        self.vector(|i| d[i] - (end.numbers()[i] - x.numbers()[i]))
+    pub(super) fn lost_digits(
+        &self,
+        path: Path,
+        [x, end]: [&L::State; 2],
+        d: &L::Vector,
+    ) -> L::Vector {
+        let Some(paths) = self.paths() else {
+            return self.vector(|i| d[i] - (end.numbers()[i] - x.numbers()[i]));
+        };
+        let mut lost = self.zero();
+        paths.lost_digits(path, x.numbers(), d.numbers(), end.numbers(), lost.numbers_mut());
+        lost
+    }
+
+    /// The relative accuracy of the ends of paths.
+    pub(super) fn accuracy(&self, path: Path) -> f64 {
+        self.paths().map_or(0.0, |paths| paths.accuracy(path))
+    }
+
+    /// The end of the path of a displacement; `None` where it cannot be followed.
+    #[inline]
+    pub(super) fn end(&self, path: Path, x: &L::State, u: &L::Vector) -> Option<L::State> {
+        if self.is_flat() {
+            return Some(self.moved(x, u));
+        }
+        let (paths, mut end) = (self.paths()?, self.state());
+        paths.end(path, x.numbers(), u.numbers(), end.numbers_mut()).ok()?;
+        Some(end)
+    }
+
+    /// The path of a displacement on a space that is not flat, with its derivatives if they are asked for.
+    pub(super) fn curved_path(
+        &self,
+        path: Path,
+        x: &L::State,
+        u: &L::Vector,
+        with_slopes: bool,
+    ) -> Option<CurvedPath<L>> {
+        let paths = self.paths()?;
+        let (mut z, mut d, mut end) = (self.state(), self.zero(), self.state());
+        let mut to = PathAt { z: z.numbers_mut(), d: d.numbers_mut(), end: end.numbers_mut() };
+        let (x, u) = (x.numbers(), u.numbers());
+        let mut slopes = None;
+        if with_slopes {
+            let [mut dz, mut dd, mut dend] = [self.zeros(), self.zeros(), self.zeros()];
+            let all = [&mut dz, &mut dd, &mut dend].map(Matrix::numbers_mut);
+            let [dz_to, dd_to, dend_to] = all;
+            let of_path = &mut PathSlopes { dz: dz_to, dd: dd_to, dend: dend_to };
+            paths.path_jet(path, x, u, (&mut to, of_path)).ok()?;
+            slopes = Some([dz, dd, dend]);
+        } else {
+            paths.path(path, x, u, &mut to).ok()?;
+        }
+        Some(CurvedPath { z, d, end, slopes })
+    }
+
+    /// The first and the second derivative of all laws along the curve of a path, at a fraction of its way.
+    pub(super) fn along_curve(
+        &self,
+        (path, x, u): (Path, &L::State, &L::Vector),
+        t: f64,
+    ) -> Option<SmallVec<[[f64; 2]; 2]>> {
+        let mut of_laws = smallvec![[0.0; 2]; self.kinds.len() + ENTROPY + 1];
+        let start = (x.numbers(), u.numbers(), t);
+        let paths = (self.paths()?, path);
+        self.model.along_curve(self.time, paths, start, &mut of_laws).ok()?;
+        Some(of_laws)
+    }
+
+    /// The velocity at `φ_x(q)` with the components `v` in the chart at `x`, in the chart at `y`.
+    #[inline]
+    pub(super) fn velocity_at(
+        &self,
+        y: &L::State,
+        (x, q): (&L::State, &L::Vector),
+        v: &L::Vector,
+    ) -> L::Vector {
+        let Some(paths) = self.paths() else { return v.clone() };
+        let mut to = self.zero();
+        let (at, from) = (y.numbers(), (x.numbers(), q.numbers()));
+        paths.velocity_at(at, from.0, from.1, v.numbers(), to.numbers_mut());
+        to
+    }
+
+    /// Carries vectors from a state to another one near by.
+    #[inline]
+    pub(super) fn transport(&self, x: &L::State, y: &L::State, vectors: &mut [L::Vector]) {
+        if let Some(paths) = self.paths() {
+            let n = self.n();
+            with_numbers(n * vectors.len(), |all| {
+                let pairs = all.chunks_exact_mut(n).zip(&*vectors);
+                pairs.for_each(|(to, v)| to.copy_from_slice(v.numbers()));
+                paths.transport(x.numbers(), y.numbers(), all);
+                let pairs = all.chunks_exact(n).zip(vectors);
+                pairs.for_each(|(v, to)| to.numbers_mut().copy_from_slice(v));
+            });
+        }
+    }
+
+    /// The size of the terms of the slope `⟨w, v⟩`.
+    #[inline]
+    pub(super) fn pairing_size(&self, w: &L::Vector, v: &L::Vector) -> f64 {
+        let of_terms = || sum_of_terms(w, v);
+        self.paths().map_or_else(of_terms, |paths| paths.pairing_size(w.numbers(), v.numbers()))
+    }
+
+    /// The metric at a state; `None` where it cannot be used.
+    #[inline]
+    pub(super) fn metric(&self, x: &L::State) -> Option<Metric<L>> {
+        if const { L::IS_FLAT } || !self.has_metric {
+            return Some(Metric::CANONICAL);
+        }
+        Metric::at(self.model, x, self.n())
+    }
+
+    /// The model itself.
+    pub(super) const fn model(&self) -> &'a dyn Model {
+        self.model
+    }
+
+    /// The differential of a law at `φ_x(q)`, in the chart at `x`.
+    pub(super) fn differential_at(&self, law: usize, x: &L::State, q: &L::Vector) -> L::Vector {
+        let mut df = self.zero();
+        let (x, q) = (x.numbers(), q.numbers());
+        self.model.differential_at(law, self.time, x, q, df.numbers_mut());
+        df
+    }
+
+    /// The Hessian of a law at `φ_x(q)`, in the chart at `x`.
+    pub(super) fn hessian_at(&self, law: usize, x: &L::State, q: &L::Vector) -> Matrix<L> {
+        let mut hf = self.zeros();
+        let (x, q) = (x.numbers(), q.numbers());
+        self.model.hessian_at(law, self.time, x, q, hf.numbers_mut());
+        hf
     }
 
     /// The laws at a state.

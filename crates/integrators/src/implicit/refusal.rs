@@ -1,6 +1,8 @@
 //! Why a system has no implicit steps.
 
-use metriplectic_equations::{Equations, Sizes};
+use metriplectic_equations::{ByCharts, Equations, Path, Paths as _, Sizes};
+
+use super::parts::is_flat;
 
 /// A system, or a method, without implicit steps in plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -11,16 +13,11 @@ pub enum NoImplicitSteps {
         "an implicit method asks for the parts of a system, its bracket and its friction: answer `Equations::model`, or take an explicit method"
     )]
     Model,
-    /// The space of the system is not known to be a vector space.
+    /// Geodesics of the system are not known.
     #[error(
-        "an implicit method takes steps along the straight lines of a vector space: answer `Equations::is_vector_space` if the charts are translations, or take an explicit method"
+        "the geodesics of this system are not known, only its charts: take `ChartMidpoint`, or answer `Model::paths`"
     )]
-    Space,
-    /// The metric of the system is not the canonical one.
-    #[error(
-        "an implicit method in plain numbers has the canonical metric of a vector space: answer `Model::has_canonical_metric` if it is that one, or take an explicit method"
-    )]
-    Metric,
+    Geodesics,
     /// The retraction or the discrete gradient is not one of this library.
     #[error(
         "a system in plain numbers is stepped by the retractions and the discrete gradients of this library alone"
@@ -41,14 +38,14 @@ pub enum NoImplicitSteps {
 /// A factor of four fails `tests/lattices/implicit.rs::a_lattice_without_implicit_steps_says_which_method_to_take`.
 const MOST: usize = 1024;
 
-/// Refuses a system without implicit steps.
-pub(crate) fn refuse(system: &dyn Equations) -> Result<(), NoImplicitSteps> {
+/// Refuses a system without implicit steps along the paths of a retraction.
+pub(crate) fn refuse(system: &dyn Equations, path: Path) -> Result<(), NoImplicitSteps> {
     let Some(model) = system.model() else { return Err(NoImplicitSteps::Model) };
-    let Sizes { entries, directions: variables, .. } = system.sizes();
-    if !system.is_vector_space() || entries != variables {
-        Err(NoImplicitSteps::Space)
-    } else if !model.has_canonical_metric() {
-        Err(NoImplicitSteps::Metric)
+    let Sizes { directions: variables, .. } = system.sizes();
+    let by_charts = || ByCharts(model).follows(path);
+    let follows = || model.paths().map_or_else(by_charts, |paths| paths.follows(path));
+    if !is_flat(model) && !follows() {
+        Err(NoImplicitSteps::Geodesics)
     } else if variables > MOST {
         Err(NoImplicitSteps::Variables { variables })
     } else {

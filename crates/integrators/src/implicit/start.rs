@@ -2,11 +2,11 @@
 
 use metriplectic_equations::{ENERGY, ENTROPY};
 
-use super::algebra::{dot, vector};
+use super::algebra::dot;
 use super::parts::{OfLaws, Parts};
-use crate::numbers::{Lengths, List};
+use crate::numbers::Lengths;
 use crate::round_off::bound::{NO_DIGITS, ROUNDED};
-use crate::step::{Effort, Evidence, Laws, both};
+use crate::step::{Effort, Evidence, Laws, Vector as _, both};
 
 /// Where an implicit step starts.
 pub(super) struct Start<'a, L: Lengths> {
@@ -95,7 +95,7 @@ impl<L: Lengths> Parts<'_, L> {
 
     /// The sizes of the terms of the energy on a step, at its two ends.
     pub(super) fn sizes_on_a_step(&self, [x, end]: [&L::State; 2]) -> [f64; 2] {
-        let d: L::Vector = vector(self.n(), |i| (end.numbers()[i] - x.numbers()[i]).abs());
+        let d = self.between(x, end).map(f64::abs);
         both([x, end], |x| {
             let (_, df) = self.jet(ENERGY, x);
             let exchanged = dot(&self.vector(|i| df[i].abs()), &d);
@@ -112,7 +112,7 @@ impl<L: Lengths> Parts<'_, L> {
         } else {
             self.zero()
         };
-        super::algebra::add(&mut v, 1.0, &self.irreversible(x, &w)?);
+        super::algebra::add(&mut v, 1.0, &self.irreversible((x, self.metric(x)?.units()), &w)?);
         Some(v)
     }
 }

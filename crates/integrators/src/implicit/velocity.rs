@@ -6,7 +6,8 @@ use metriplectic_dynamics::velocity::{CASIMIR, MOMENTUM};
 use metriplectic_equations::Part;
 
 use super::algebra::{Matrix, add, dot};
-use super::orthogonal::{Orthogonal, OrthogonalJet, Units, scaled};
+use super::metric::{MetricAlong, Units};
+use super::orthogonal::{Of, Orthogonal, OrthogonalJet, scaled};
 use super::parts::{OfLaws, PartJet, Parts, WithJacobian};
 use crate::numbers::{Lengths, List};
 
@@ -28,7 +29,11 @@ impl<L: Lengths> Parts<'_, L> {
 
     /// Computes the vector `Π̃ w_H`; `None` where it has no value.
     #[inline]
-    pub(super) fn reversible(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+    pub(super) fn reversible(
+        &self,
+        (z, g): (&L::State, Units<'_, L>),
+        w: &OfLaws<L::Vector>,
+    ) -> Option<L::Vector> {
         if !self.moves {
             return Some(self.zero());
         }
@@ -38,7 +43,7 @@ impl<L: Lengths> Parts<'_, L> {
         if !is_projected && !has_momenta {
             return bracket(energy);
         }
-        if self.kinds.is_empty() {
+        if self.kinds.is_empty() && matches!(g, Units::Canonical) {
             // With the entropy alone, the same projections need no list.
             let square = dot(entropy, entropy);
             if square > 0.0 {
@@ -52,7 +57,7 @@ impl<L: Lengths> Parts<'_, L> {
             }
             return bracket(energy);
         }
-        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        let mut normals = Orthogonal::none();
         if self.is_exact {
             normals.push(g, entropy);
         }
@@ -74,20 +79,24 @@ impl<L: Lengths> Parts<'_, L> {
 
     /// Computes the vector `K̃ w_S`, and adds the vector of a force; `None` where it has no value.
     #[inline]
-    pub(super) fn irreversible(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
-        let mut v = self.friction(z, w)?;
+    pub(super) fn irreversible(
+        &self,
+        at: (&L::State, Units<'_, L>),
+        w: &OfLaws<L::Vector>,
+    ) -> Option<L::Vector> {
+        let mut v = self.friction(at, w)?;
         if self.is_forced {
-            add(&mut v, 1.0, &self.force(z, w)?);
+            add(&mut v, 1.0, &self.force(at, w)?);
         }
         Some(v)
     }
 
-    fn force(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+    fn force(&self, (z, g): (&L::State, Units<'_, L>), w: &OfLaws<L::Vector>) -> Option<L::Vector> {
         let force = self.apply(Part::Gyroscopic, z, [&w.energy, &w.entropy, &w.energy])?;
         if self.kinds.is_empty() {
             return Some(force);
         }
-        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        let mut normals = Orthogonal::none();
         normals.push(g, &w.energy);
         if self.is_exact {
             normals.push(g, &w.entropy);
@@ -97,7 +106,11 @@ impl<L: Lengths> Parts<'_, L> {
     }
 
     #[inline]
-    fn friction(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+    fn friction(
+        &self,
+        (z, g): (&L::State, Units<'_, L>),
+        w: &OfLaws<L::Vector>,
+    ) -> Option<L::Vector> {
         if !self.rubs {
             return Some(self.zero());
         }
@@ -106,7 +119,7 @@ impl<L: Lengths> Parts<'_, L> {
         if self.kinds.is_empty() {
             return k(entropy);
         }
-        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        let mut normals = Orthogonal::none();
         normals.push(g, energy);
         let first = normals.len();
         w.invariants.iter().for_each(|l| normals.push(g, l));
@@ -152,12 +165,42 @@ fn terms<L: Lengths>(a: &Matrix<L>, v: &L::Vector) -> L::Vector {
     sum
 }
 
+/// The derivative of a point along the unknown of a step.
+pub(crate) enum Turn<'a, L: Lengths> {
+    /// A multiple of the identity.
+    Scaled(f64),
+    /// This matrix.
+    By(&'a Matrix<L>),
+}
+
+// By hand, because lengths have none.
+impl<L: Lengths> Clone for Turn<'_, L> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L: Lengths> Copy for Turn<'_, L> {}
+
+impl<L: Lengths> Turn<'_, L> {
+    /// The derivatives `A ∂z` of a function with the derivatives `A`.
+    #[inline]
+    pub(super) fn after(self, a: &Matrix<L>) -> Matrix<L> {
+        match self {
+            Self::Scaled(c) => scaled(a, c),
+            Self::By(dz) => a.product(dz),
+        }
+    }
+}
+
 /// Where the velocity of a system is linearised, along the unknown of a step.
 struct Linearisation<'a, L: Lengths> {
     parts: &'a Parts<'a, L>,
     z: &'a L::State,
-    /// The derivative of the point, a multiple of the identity.
-    dz: f64,
+    /// The derivative of the point.
+    dz: Turn<'a, L>,
+    /// The metric there, if it is not the canonical one.
+    metric: Option<&'a MetricAlong<'a, L>>,
     w: &'a OfLaws<WithJacobian<L>>,
     /// Says whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
     is_whole: bool,
@@ -174,7 +217,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         let OfLaws { energy, entropy, .. } = self.w;
         let w = [&energy.value, &entropy.value, &alpha.value];
         let jet = self.parts.linearise(part, self.z, w)?;
-        let mut slope = scaled(&jet.along_x, self.dz);
+        let mut slope = self.dz.after(&jet.along_x);
         slope.add(1.0, &jet.along_w.product(&other.slope));
         slope.add(1.0, &jet.tensor.product(&alpha.slope));
         if self.is_whole
@@ -206,7 +249,7 @@ impl<L: Lengths> Linearisation<'_, L> {
     }
 
     fn reversible(&self) -> Option<OfPart<L>> {
-        let &Self { parts, w, .. } = self;
+        let &Self { parts, w, metric, .. } = self;
         if !parts.moves {
             return Some(self.none());
         }
@@ -218,11 +261,11 @@ impl<L: Lengths> Linearisation<'_, L> {
         }
         let mut normals = OrthogonalJet::none();
         if parts.is_exact {
-            normals.push(&w.entropy);
+            normals.push_in(metric, &w.entropy);
         }
-        parts.of_kind(Kind::Casimir, w).for_each(|c| normals.push(c));
+        parts.of_kind(Kind::Casimir, w).for_each(|c| normals.push_in(metric, c));
         let mut pi = if is_projected {
-            bracket(&normals.faded(0, &w.energy, CASIMIR))?
+            bracket(&normals.faded(0, (&w.energy, Of::Covector), CASIMIR))?
         } else {
             bracket(&w.energy)?
         };
@@ -230,63 +273,66 @@ impl<L: Lengths> Linearisation<'_, L> {
             // The projection of the covector has its own terms. Those of a Casimir that fades out are not amplified: such a
             // bound would stop Newton's method where energy and entropy still gain digits.
             let mut of_covector = parts.zero();
-            normals.add_terms(0, &w.energy.value, CASIMIR, (&mut of_covector, 1.0));
+            let energy = (&w.energy.value, Of::Covector);
+            normals.add_terms(0, energy, CASIMIR, (&mut of_covector, 1.0));
             add(&mut pi.terms, 1.0, &terms(&pi.tensor, &of_covector));
-            normals.add_terms(0, &pi.vector.value, CASIMIR, (&mut pi.terms, 1.0));
-            pi.vector = normals.faded(0, &pi.vector, CASIMIR);
+            let v = (&pi.vector.value, Of::Vector);
+            normals.add_terms(0, v, CASIMIR, (&mut pi.terms, 1.0));
+            pi.vector = normals.faded(0, (&pi.vector, Of::Vector), CASIMIR);
         }
         if has_momenta {
-            normals.push(&w.energy);
+            normals.push_in(metric, &w.energy);
             let first = normals.len();
-            parts.of_kind(Kind::Momentum, w).for_each(|j| normals.push(j));
+            parts.of_kind(Kind::Momentum, w).for_each(|j| normals.push_in(metric, j));
             let amplification = 1.0 + normals.amplification(first, MOMENTUM);
-            let v = &pi.vector.value;
+            let v = (&pi.vector.value, Of::Vector);
             normals.add_terms(first, v, MOMENTUM, (&mut pi.terms, amplification));
-            pi.vector = normals.faded(first, &pi.vector, MOMENTUM);
+            pi.vector = normals.faded(first, (&pi.vector, Of::Vector), MOMENTUM);
         }
         Some(pi)
     }
 
     fn force(&self) -> Option<OfPart<L>> {
-        let &Self { parts, w, .. } = self;
+        let &Self { parts, w, metric, .. } = self;
         let (_, mut force) = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
         if parts.kinds.is_empty() {
             return Some(force);
         }
         let mut normals = OrthogonalJet::none();
-        normals.push(&w.energy);
+        normals.push_in(metric, &w.energy);
         if parts.is_exact {
-            normals.push(&w.entropy);
+            normals.push_in(metric, &w.entropy);
         }
         let (first, value) = (normals.len(), force.vector.value.clone());
         let listed = w.invariants.iter();
-        force.vector = listed.fold(force.vector, |v, l| normals.without(l, v, MOMENTUM));
+        force.vector = listed.fold(force.vector, |v, l| normals.without(metric, l, v, MOMENTUM));
         let amplification = 1.0 + normals.amplification(first, MOMENTUM);
-        normals.add_terms(first, &value, MOMENTUM, (&mut force.terms, amplification));
+        let v = (&value, Of::Vector);
+        normals.add_terms(first, v, MOMENTUM, (&mut force.terms, amplification));
         Some(force)
     }
 }
 
-/// Computes the velocity at a point, with the derivatives along the unknown of a step, from those of the covectors and of the point,
-/// a multiple `dz` of the identity; `None` where it has no value. They are those of Newton's method, which leaves out that of a
+/// Computes the velocity at a point, with the derivatives along the unknown of a step, from those of the covectors and of the point;
+/// `None` where it has no value. They are those of Newton's method, which leaves out that of a
 /// friction along the covector of the entropy.
 pub(super) fn velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
-    z: &L::State,
-    dz: f64,
+    (z, dz, metric): (&L::State, Turn<'_, L>, Option<&MetricAlong<'_, L>>),
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz, w, is_whole: false }.velocity()
+    Linearisation { parts, z, dz, metric, w, is_whole: false }.velocity()
 }
 
-/// Computes [`velocity_jet`] with all derivatives.
+/// Computes [`velocity_jet`] with all derivatives, on a vector space with the canonical metric, where that of the point is a multiple
+/// `dz` of the identity.
 pub(crate) fn whole_velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
     dz: f64,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz, w, is_whole: true }.velocity()
+    Linearisation { parts, z, dz: Turn::Scaled(dz), metric: None, w, is_whole: true }.velocity()
 }
 
 /// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives along the state.
@@ -295,7 +341,7 @@ pub(super) fn written_velocity_jet<L: Lengths>(
     z: &L::State,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    let at = Linearisation { parts, z, dz: 1.0, w, is_whole: true };
+    let at = Linearisation { parts, z, dz: Turn::Scaled(1.0), metric: None, w, is_whole: true };
     at.with_reversible(at.written()?)
 }
 
@@ -306,7 +352,8 @@ pub(crate) fn reversible_jet<L: Lengths>(
     dz: f64,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<WithJacobian<L>> {
-    Some(Linearisation { parts, z, dz, w, is_whole: true }.reversible()?.vector)
+    let dz = Turn::Scaled(dz);
+    Some(Linearisation { parts, z, dz, metric: None, w, is_whole: true }.reversible()?.vector)
 }
 
 impl<L: Lengths> Linearisation<'_, L> {
@@ -316,14 +363,14 @@ impl<L: Lengths> Linearisation<'_, L> {
 
     /// The velocity with this reversible part.
     fn with_reversible(&self, pi: OfPart<L>) -> Option<VelocityJet<L>> {
-        let &Self { parts, w, .. } = self;
+        let &Self { parts, w, metric, .. } = self;
         let mut normals = OrthogonalJet::none();
         let (mut first, mut alpha) = (0, None);
         if !parts.kinds.is_empty() {
-            normals.push(&w.energy);
+            normals.push_in(metric, &w.energy);
             first = normals.len();
-            w.invariants.iter().for_each(|l| normals.push(l));
-            alpha = Some(normals.projected(first, &w.entropy));
+            w.invariants.iter().for_each(|l| normals.push_in(metric, l));
+            alpha = Some(normals.covector(first, &w.entropy));
         }
         let alpha = alpha.as_ref().unwrap_or(&w.entropy);
         let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
@@ -332,9 +379,10 @@ impl<L: Lengths> Linearisation<'_, L> {
             let (jet, k) = self.part(Part::Irreversible, alpha, &w.energy)?;
             let amplified = 1.0 + normals.amplification(first, MOMENTUM);
             add(&mut terms, 1.0, &k.terms);
-            normals.add_terms(first, &k.vector.value, MOMENTUM, (&mut terms, amplified));
+            let v = (&k.vector.value, Of::Vector);
+            normals.add_terms(first, v, MOMENTUM, (&mut terms, amplified));
             sensitivity.add(1.0, &jet.along_w);
-            irreversible = Some(normals.projected(first, &k.vector));
+            irreversible = Some(normals.vector(first, &k.vector));
         }
         if parts.is_forced {
             let force = self.force()?;

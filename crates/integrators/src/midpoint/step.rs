@@ -30,12 +30,12 @@ where
 
     const HAS_DEFAULT_BETWEEN: bool = true;
 
-    const IS_IMPLICIT: bool = R::BASE_OF_LINES.is_some() && has_bits_of_types(W::KIND);
+    const IS_IMPLICIT: bool = R::PATH.is_some() && has_bits_of_types(W::KIND);
 
     fn compiled(&self) -> Option<Compiled> {
         let &Self { newton, splits, .. } = self;
         let gradient = W::KIND.filter(|_| has_bits_of_types(W::KIND))?;
-        let line = LineOfStep { base: R::BASE_OF_LINES?, gradient };
+        let line = LineOfStep { path: R::PATH?, gradient };
         Some(Compiled::Midpoint { name: scheme_name::<R, W>, line, newton, splits })
     }
 

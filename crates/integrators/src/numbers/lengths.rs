@@ -196,6 +196,9 @@ pub(crate) trait Lengths: Debug + 'static {
     /// Says whether there may be further invariants.
     const HAS_INVARIANTS: bool;
 
+    /// Says whether a system of these lengths lives on a vector space with the canonical metric.
+    const IS_FLAT: bool = false;
+
     /// The number of directions, of which there are `count` if it is not known.
     fn directions(count: usize) -> usize;
 
@@ -253,6 +256,8 @@ impl<const N: usize, const E: usize> Lengths for Known<N, E> {
     type Rows = [[f64; N]; 2];
 
     const HAS_INVARIANTS: bool = false;
+
+    const IS_FLAT: bool = N == E;
 
     #[inline]
     fn directions(_: usize) -> usize {

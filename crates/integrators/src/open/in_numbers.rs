@@ -9,7 +9,7 @@
 //! ```
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::{Equations, Model};
+use metriplectic_equations::{Equations, Model, Path};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 use super::balance::balanced;
@@ -292,8 +292,8 @@ where
     }
 
     fn serves<F: OpenFlow>(&self, flow: &F) -> Result<(), MethodError> {
-        let known = midpoint(self).line.map(|_| ()).ok_or(NoImplicitSteps::Scheme);
-        known.and_then(|()| flow.with_equations(|system| refuse(system))).map_err(MethodError::new)
+        let line = midpoint(self).line.ok_or(NoImplicitSteps::Scheme).map_err(MethodError::new)?;
+        flow.with_equations(|system| refuse(system, line.path)).map_err(MethodError::new)
     }
 
     fn step<F: OpenFlow>(
@@ -468,7 +468,8 @@ macro_rules! of_stages {
             }
 
             fn serves<F: OpenFlow>(&self, flow: &F) -> Result<(), MethodError> {
-                flow.with_equations(|system| refuse(system)).map_err(MethodError::new)?;
+                flow.with_equations(|system| refuse(system, Path::Chart))
+                    .map_err(MethodError::new)?;
                 damps(&Self::in_numbers(), flow)
             }
 

@@ -2,6 +2,8 @@
 
 use std::any::Any;
 
+use metriplectic_equations::Path;
+
 use crate::newton::Newton;
 
 /// The discrete gradients of this library.
@@ -29,7 +31,7 @@ pub enum Compiled {
     Midpoint {
         /// Its name in a checkpoint.
         name: fn() -> String,
-        /// The path on a vector space and the discrete gradient.
+        /// The path and the discrete gradient.
         line: LineOfStep,
         /// Solves the equation of a step.
         newton: Newton,
@@ -48,12 +50,12 @@ pub enum Compiled {
     },
 }
 
-/// The step of a scheme on a vector space: a straight line with its base point, and a discrete gradient.
+/// The step of a scheme: the path of a retraction of this library, and a discrete gradient.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineOfStep {
-    /// Where the base point is, as a fraction of the displacement.
-    pub base: f64,
+    /// The path: a straight line on a vector space.
+    pub path: Path,
     /// The discrete gradient.
     pub gradient: GradientKind,
 }
@@ -66,10 +68,11 @@ macro_rules! explicit_lengths {
 }
 pub(crate) use explicit_lengths;
 
-/// Calls a macro with the numbers of variables with which implicit methods are compiled with the library.
+/// Calls a macro with the directions and the entries with which implicit methods are compiled with the library: as many of both on a vector
+/// space.
 macro_rules! implicit_lengths {
     ($with:ident) => {
-        $with!(1 2 3 4)
+        $with!((1, 1)(2, 2)(3, 3)(4, 4)(2, 3)(3, 4)(3, 9))
     };
 }
 pub(crate) use implicit_lengths;
@@ -84,11 +87,11 @@ pub(crate) const fn has_explicit(directions: usize, entries: usize) -> bool {
     explicit_lengths!(is_one_of)
 }
 
-/// Returns whether implicit methods of so many variables are compiled with the library.
-pub(crate) const fn has_implicit(variables: usize) -> bool {
+/// Returns whether implicit methods of so many directions and entries are compiled with the library.
+pub(crate) const fn has_implicit(directions: usize, entries: usize) -> bool {
     macro_rules! is_one_of {
-        ($($n:literal)*) => {
-            false $(|| variables == $n)*
+        ($(($n:literal, $e:literal))*) => {
+            false $(|| directions == $n && entries == $e)*
         };
     }
     implicit_lengths!(is_one_of)

@@ -16,7 +16,7 @@ use super::smooth::SmoothFlow;
 use crate::collocation::Tableau;
 use crate::compiled::explicit;
 use crate::explicit::ExplicitRungeKutta;
-use crate::implicit::Collocation;
+use crate::implicit::{Collocation, is_flat};
 use crate::numbers::FromEquations;
 use crate::step::{
     Compiled, Directions, Entries, Flow as _, Laws, LineOfStep, Stepper, Vector as _,
@@ -172,7 +172,7 @@ impl<S: Equations> FromEquations<S> {
     /// How the steps of a method are differentiated; `None` for other steps beside them.
     fn exactly(&self, method: Option<Compiled>) -> Option<Exactly<'_>> {
         let method = method.filter(|_| self.0.is_vector_space())?;
-        let model = self.0.model();
+        let model = self.0.model().filter(|model| is_flat(*model));
         let stages = |method: Option<Collocation>| Some(Exactly::Stages(model?, method?.tableau));
         match method {
             Compiled::Explicit(_) => explicit(method).map(Exactly::Explicit),
@@ -186,7 +186,7 @@ impl<S: Equations> FromEquations<S> {
     }
 }
 
-/// The derivatives are exact on a [model](metriplectic_equations::Model) on a vector space; to two thirds of the digits where it has
+/// The derivatives are exact on a [model](metriplectic_equations::Model) on a vector space with the canonical metric; to two thirds of the digits where it has
 /// [differences](metriplectic_equations::Differences), and for explicit methods where its parts are not known apart. Other
 /// methods and spaces have them by differences of steps.
 impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {

@@ -2,13 +2,15 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
-use metriplectic_equations::{Apart, Covectors, Differences, Equations, Part, PointError, Sizes};
-use metriplectic_fields::{Column as _, Space as _};
+use metriplectic_equations::{
+    Apart, Covectors, Differences, Equations, Part, Paths, PointError, Sizes,
+};
+use metriplectic_fields::Column as _;
 use metriplectic_integrators::open::{Exchanged, OpenFlow, OpenSteps};
 use metriplectic_integrators::{
     Control, Directions, DiscreteGradient, Element, Entries, Flow as _, Gauss, Laws, Listed as _,
-    MethodError, NoImplicitSteps, Promises, Radau, Refusal, Scheme, StepEnds, StepError, StepStart,
-    Stepper, Taken, Vector as _,
+    MethodError, Promises, Radau, Refusal, Scheme, StepEnds, StepError, StepStart, Stepper, Taken,
+    Vector as _,
 };
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
@@ -21,12 +23,16 @@ use crate::lattice::Lattice;
 use crate::model::{Model, VectorOf};
 use crate::points::Points;
 
-/// An open lattice in plain numbers.
-struct Driven<'a, P: Model>(&'a OpenLattice<P>);
+/// An open lattice in plain numbers, and its closed part.
+struct Driven<'a, P: Model>(&'a OpenLattice<P>, Dense<'a, P>);
 
-impl<P: Model> Driven<'_, P> {
-    fn closed(&self) -> Dense<'_, P> {
-        Dense(&self.0.lattice)
+impl<'a, P: Model> Driven<'a, P> {
+    const fn of(lattice: &'a OpenLattice<P>) -> Self {
+        Self(lattice, Dense(&lattice.lattice))
+    }
+
+    const fn closed(&self) -> &Dense<'a, P> {
+        &self.1
     }
 
     /// The effects of ports and baths with these covectors `w_H` and `w_S` of energy and entropy.
@@ -94,9 +100,29 @@ impl<P: Model> Equations for Driven<'_, P> {
     fn defect(&self, x: &[f64]) -> f64 {
         self.closed().defect(x)
     }
+
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        self.closed().scales(x, sizes);
+    }
+
+    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+        self.closed().chart(x, q, y);
+    }
+
+    fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
+        self.closed().coordinates(x, y, q)
+    }
 }
 
 impl<P: Model> Apart for Driven<'_, P> {
+    fn has_charts(&self) -> bool {
+        self.closed().has_charts()
+    }
+
+    fn paths(&self) -> Option<&dyn Paths> {
+        self.closed().paths()
+    }
+
     fn is_zero(&self, part: Part) -> bool {
         match part {
             Part::Gyroscopic => self.0.parts.is_empty(),
@@ -120,7 +146,7 @@ impl<P: Model> OpenFlow for OpenLattice<P> {
     type Point = Points<P::Manifold>;
 
     fn with_equations<T>(&self, f: impl FnOnce(&dyn Equations) -> T) -> T {
-        f(&Differences(Driven(self)))
+        f(&Differences(Driven::of(self)))
     }
 
     fn entries(&self, x: &Self::Point) -> Entries {
@@ -145,7 +171,7 @@ impl<P: Model> OpenFlow for OpenLattice<P> {
         if self.baths(t).iter().any(|(_, temperature)| *temperature < 0.0) {
             return None;
         }
-        let OfParts { entries, production, .. } = Driven(self).exchanged(t, x, w);
+        let OfParts { entries, production, .. } = Driven::of(self).exchanged(t, x, w);
         let is_finite = production.is_finite() && entries.iter().all(|rate| rate.is_finite());
         is_finite.then_some(Exchanged { entries, production })
     }
@@ -194,9 +220,6 @@ macro_rules! implicit {
             }
 
             fn serves(&self, lattice: &OpenLattice<P>) -> Result<(), MethodError> {
-                if !P::Manifold::IS_VECTOR_SPACE {
-                    return Err(MethodError::new(NoImplicitSteps::Space));
-                }
                 OpenSteps::serves(self, lattice)
             }
 

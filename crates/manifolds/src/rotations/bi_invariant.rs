@@ -17,6 +17,8 @@ use crate::{Canonical, Manifold, Riemannian, Slopes, StepPath, StepPathJet};
 const CURVATURE: f64 = 0.25;
 
 impl Riemannian<Rotations> for Canonical {
+    const IS_CANONICAL: bool = true;
+
     type At<D: Scalar> = Normal<D, 3>;
 
     #[inline]

@@ -16,6 +16,8 @@ use crate::{Canonical, Manifold, Riemannian, Slopes, StepPath, StepPathJet};
 macro_rules! round {
     ($n:literal in $a:literal) => {
         impl Riemannian<Sphere<$n>> for Canonical {
+            const IS_CANONICAL: bool = true;
+
             type At<D: Scalar> = Normal<D, $n>;
 
             #[inline]

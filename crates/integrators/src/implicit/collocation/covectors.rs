@@ -10,6 +10,7 @@ use crate::collocation::covectors::{Correction, LawStart};
 use crate::collocation::tableau::{Numbers, STAGES, Tableau};
 use crate::collocation::trust;
 use crate::implicit::algebra::{add, dot, is_finite, magnitude, sum_of_terms};
+use crate::implicit::metric::{Metric, Units};
 use crate::implicit::parts::{OfLaws, Parts};
 use crate::numbers::Lengths;
 use crate::round_off::bound::NO_DIGITS;
@@ -90,7 +91,22 @@ impl<L: Lengths> StepPolynomial<'_, L> {
     }
 }
 
-/// The stages of a step: points and velocities.
+/// The displacements `h k_i` of the stages of a step of size `h` from `x`, in the chart at its middle.
+#[inline]
+pub(super) fn displacements<L: Lengths>(
+    tableau: &Tableau,
+    (parts, x, h): (&Parts<'_, L>, &L::State, f64),
+    chart: &StepChart<L>,
+    k: &Stages<L::Vector>,
+) -> Stages<L::Vector> {
+    each_stage(parts, tableau.stages, |i| {
+        let Some(shift) = chart.shift() else { return k[i].map(|k| k * h) };
+        let k = chart.to_middle(parts, x, &k[i]);
+        parts.vector(|c| shift[c] + k[c] * h)
+    })
+}
+
+/// The stages of a step: points, velocities in the frames there, and metrics.
 pub(super) struct StagePoints<L: Lengths> {
     /// The points `X_i`; those beyond the last stage repeat the middle.
     pub(super) x: Stages<L::State>,
@@ -98,6 +114,8 @@ pub(super) struct StagePoints<L: Lengths> {
     pub(super) q: Stages<L::Vector>,
     /// The velocities `v_i`.
     pub(super) v: Stages<L::Vector>,
+    /// The metrics.
+    metrics: Stages<Metric<L>>,
     /// The covectors `♭v_i/υ` with the unit `υ`.
     flat: Stages<L::Vector>,
     /// A power of two near the largest velocity.
@@ -107,7 +125,7 @@ pub(super) struct StagePoints<L: Lengths> {
 }
 
 impl<L: Lengths> StagePoints<L> {
-    /// The stages of a polynomial; `None` where a velocity is not finite.
+    /// The stages of a polynomial; `None` where a velocity is not finite, or there is no metric.
     #[inline]
     pub(super) fn of(polynomial: &StepPolynomial<'_, L>) -> Option<Self> {
         let StepPolynomial { parts, tableau, chart, k, h, .. } = polynomial;
@@ -122,16 +140,35 @@ impl<L: Lengths> StagePoints<L> {
                     if i < s { parts.moved(&chart.z, &q[i]) } else { chart.z.clone() }
                 },
             );
+        if !parts.is_flat() && x[..s].iter().any(|x| parts.is_outside(x)) {
+            return None;
+        }
         let rate = h.recip();
-        let v = each_stage(parts, s, |i| k[i].map(|k| k * rate));
+        let v = each_stage(parts, s, |i| {
+            let scaled = |k: &L::Vector| k.map(|k| k * rate);
+            if parts.is_flat() {
+                return scaled(&k[i]);
+            }
+            scaled(&parts.velocity_at(&x[i], (&chart.z, &q[i]), &k[i]))
+        });
         let largest = v[..s].iter().map(magnitude).fold(0.0, f64::max);
         if !largest.is_finite() {
             return None;
         }
         let unit = power_of_two(largest);
-        let flat = each_stage(parts, s, |i| v[i].map(|v| v / unit));
-        let square = (0..s).fold(0.0, |sum, i| sum + h * weights[i] * dot(&flat[i], &flat[i]));
-        Some(Self { x, q, v, flat, unit, square })
+        let mut metrics = [const { Metric::CANONICAL }; STAGES];
+        for i in 0..s {
+            metrics[i] = parts.metric(&x[i])?;
+        }
+        let in_unit = each_stage(parts, s, |i| v[i].map(|v| v / unit));
+        let flat = each_stage(parts, s, |i| metrics[i].units().flat(&in_unit[i]));
+        let square = (0..s).fold(0.0, |sum, i| sum + h * weights[i] * dot(&flat[i], &in_unit[i]));
+        Some(Self { x, q, v, metrics, flat, unit, square })
+    }
+
+    /// A stage with the units of its metric.
+    pub(super) fn at(&self, i: usize) -> (&L::State, Units<'_, L>) {
+        (&self.x[i], self.metrics[i].units())
     }
 
     /// The covector `♭v_i`.
@@ -228,7 +265,7 @@ impl<L: Lengths> AlongStages<'_, L> {
         for i in 0..s {
             let (w, v) = (&*w[i].of_mut(law), stages.v[i].map(|v| v * in_unit));
             slope += tableau.weights[i] * step * dot(w, &v);
-            change += tableau.weights[i] * size_of_step * sum_of_terms(w, &v);
+            change += tableau.weights[i] * size_of_step * parts.pairing_size(w, &v);
             size += tableau.weights[i] * sum_of_terms(w, scales);
         }
         let none = LawOfStages { end, size, noise: parts.zero(), left: 0.0, left_round_off: 0.0 };
@@ -283,7 +320,12 @@ impl<L: Lengths> AlongStages<'_, L> {
         tableau.points().iter().fold(0.0, |sum, point| {
             let q = self.polynomial.combined(&point.position);
             let v = self.polynomial.combined(&point.velocity);
-            let [slope, _] = parts.along(law, &parts.moved(&chart.z, &q), &v);
+            let at = parts.moved(&chart.z, &q);
+            let [slope, _] = if parts.is_flat() {
+                parts.along(law, &at, &v)
+            } else {
+                parts.along(law, &at, &parts.velocity_at(&at, (&chart.z, &q), &v))
+            };
             sum + point.weight * slope
         })
     }

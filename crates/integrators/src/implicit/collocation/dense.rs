@@ -1,6 +1,7 @@
 //! States inside a step with stages, and the error of a step. As in [`crate::collocation`].
 
-use super::covectors::{combined, each_stage};
+use super::chart::StepChart;
+use super::covectors::{combined, displacements, each_stage};
 use super::equation::StageEquation;
 use super::fallbacks;
 use super::memory::{LastStep, StageNumbers};
@@ -63,12 +64,21 @@ impl Collocation {
         let velocity = |i: usize| parts[i].velocity(ends[i]).filter(is_finite);
         let [first, second] = [velocity(0)?, velocity(1)?];
         let (tableau, LastStep { k, filter }) = (self.tableau, memory.last.as_ref()?);
-        let parts = parts[0];
-        let k = each_stage(parts, tableau.stages, |i| k[i].map(|k| k * h));
-        let defect = |tau: f64, velocity: &L::Vector| {
+        let (parts, x) = (parts[0], ends[0]);
+        let u = combined(h, tableau.stages, &tableau.weights, k);
+        let chart = StepChart::of(parts, x, u)?;
+        let k = displacements(tableau, (parts, x, h), &chart, k);
+        let defect = |tau: f64, at: &L::State, velocity: &L::Vector| {
             let slope = combined(1.0, tableau.stages, &tableau.velocity(tau), &k);
-            filter.times(&parts.vector(|c| slope[c] - velocity[c] * h))
+            if parts.is_flat() {
+                return filter.times(&parts.vector(|c| slope[c] - velocity[c] * h));
+            }
+            let q = chart.d.map(|d| d * (tau - 0.5));
+            let there = parts.velocity_at(at, (&chart.z, &q), &slope);
+            let off = parts.vector(|c| there[c] - velocity[c] * h);
+            let middle = parts.velocity_at(&chart.z, (at, &parts.zero()), &off);
+            filter.times(&chart.to_start(parts, x, middle))
         };
-        Some([defect(0.0, &first), defect(1.0, &second)])
+        Some([defect(0.0, x, &first), defect(1.0, ends[1], &second)])
     }
 }

@@ -4,7 +4,7 @@ use metriplectic_equations::{ENERGY, ENTROPY};
 
 use super::chart::StepChart;
 use super::covectors::{
-    LawOfStages, StageCovectors, StagePoints, StepPolynomial, all_finite, combined, each_stage,
+    LawOfStages, StageCovectors, StagePoints, StepPolynomial, all_finite, combined, displacements,
     of_law, zeros,
 };
 use super::heat::{self, HeatStart};
@@ -57,7 +57,7 @@ impl<L: Lengths> Clone for StageEquation<'_, L> {
 
 /// The equation at given velocities.
 pub(super) struct Evaluated<L: Lengths> {
-    /// The deficits of the velocities of the stages.
+    /// The deficits of the velocities of the stages, at `x`.
     pub(super) residual: Unknowns<L>,
     /// The end of the step.
     pub(super) end: L::State,
@@ -130,8 +130,8 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
     where
         'a: 'b,
     {
-        let &Self { tableau, parts, h, .. } = self;
-        let k = each_stage(parts, tableau.stages, |i| k[i].map(|k| k * h));
+        let &Self { tableau, parts, x, h, .. } = self;
+        let k = displacements(tableau, (parts, x, h), chart, k);
         StepPolynomial { parts, tableau, chart, k, h, unit: unit_of_rates(h) }
     }
 
@@ -148,14 +148,15 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         let mut heat_rounding = parts.zero();
         if let Some(start) = &self.heats {
             let w = &covectors.w;
-            let friction = |i: usize| parts.irreversible(&stages.x[i], &w[i]);
+            let friction = |i: usize| parts.irreversible(stages.at(i), &w[i]);
             let last = tableau.stages - 1;
             let at_last = friction(last)?;
             left = h.abs() * unit * dot(&w[last].entropy, &scaled(&at_last));
             let vanishes = |v: &L::Vector| magnitude(v) == 0.0;
             let is_reversible =
                 vanishes(&at_last) && (0..last).all(|i| friction(i).is_some_and(|v| vanishes(&v)));
-            let step = heat::Step { parts, tableau, chart: &chart, h, start, is_reversible };
+            let x = self.x;
+            let step = heat::Step { parts, tableau, chart: &chart, h, x, start, is_reversible };
             let added = heat::add(&step, &stages, &mut covectors)?;
             (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
             heat_rounding = added.rounding;
@@ -167,11 +168,11 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
         let mut entropy_covector = parts.zero();
         for i in 0..tableau.stages {
-            let (x, here) = (&stages.x[i], &covectors.w[i]);
+            let (at, here) = (stages.at(i), &covectors.w[i]);
             let weight = h * tableau.weights[i] * unit;
             let at_stage = self.at_stage(i);
-            let friction = at_stage.irreversible(x, here)?;
-            let mut velocity = at_stage.reversible(x, here)?;
+            let friction = at_stage.irreversible(at, here)?;
+            let mut velocity = at_stage.reversible(at, here)?;
             add(&mut velocity, 1.0, &friction);
             let mut off = if self.in_time.is_some() {
                 exchanged += weight * dot(&here.energy, &scaled(&velocity));
@@ -189,7 +190,12 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
             }
             production += weight * dot(&here.entropy, &scaled(&friction));
             entropy_slope = entropy_slope.min(magnitude(&here.entropy));
-            residual[i] = off;
+            residual[i] = if parts.is_flat() {
+                off
+            } else {
+                let middle = parts.velocity_at(&chart.z, (at.0, &parts.zero()), &off);
+                chart.to_start(parts, self.x, middle)
+            };
         }
         let StageCovectors { laws, excursion, .. } = covectors;
         let sizes = numbers::<L>(&laws, |law| law.size);

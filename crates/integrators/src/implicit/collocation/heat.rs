@@ -6,8 +6,8 @@ use super::covectors::{StageCovectors, StagePoints, each_stage, zeros};
 use crate::collocation::heat::{FAINT, HALVINGS, JUMP};
 use crate::collocation::tableau::{STAGES, Tableau};
 use crate::collocation::{Stages, fraction};
-use crate::implicit::algebra::{add as plus, dot, sum_of_terms};
-use crate::implicit::orthogonal::{Orthogonal, Units};
+use crate::implicit::algebra::{add as plus, dot};
+use crate::implicit::orthogonal::Orthogonal;
 use crate::implicit::parts::{OfLaws, Parts};
 use crate::numbers::{Lengths, List};
 use crate::step::Vector as _;
@@ -32,8 +32,8 @@ struct Direction<V> {
 
 impl<V: List> Direction<V> {
     /// Returns whether it changes the energy by more than its terms leave with these entries of `dH`.
-    fn is_clear(&self, energy: &V) -> bool {
-        let terms = sum_of_terms(energy, &self.sharp);
+    fn is_clear<L: Lengths<Vector = V>>(&self, parts: &Parts<'_, L>, energy: &V) -> bool {
+        let terms = parts.pairing_size(energy, &self.sharp);
         let alignment = if terms > 0.0 { self.warmed / terms } else { 0.0 };
         alignment.abs() > FAINT
     }
@@ -47,22 +47,24 @@ fn still<L: Lengths>(
 ) -> Option<Vec<bool>> {
     let (n, k) = (parts.n(), parts.tensor(x, w)?);
     let still: Vec<bool> = (0..n).map(|i| (0..n).all(|j| k[(i, j)] == 0.0)).collect();
-    let is_warmed = direction(parts, w, &still)?.is_clear(&w.energy);
+    let is_warmed = direction(parts, x, w, &still)?.is_clear(parts, &w.energy);
     Some(if is_warmed { still } else { vec![false; n] })
 }
 
-/// The direction of heat at a point; `None` where it is not finite.
+/// The direction of heat at a point; `None` where it is not finite, or there is no metric.
 fn direction<L: Lengths>(
     parts: &Parts<'_, L>,
+    x: &L::State,
     w: &OfLaws<L::Vector>,
     still: &[bool],
 ) -> Option<Direction<L::Vector>> {
-    let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+    let (metric, mut normals) = (parts.metric(x)?, Orthogonal::none());
+    let g = metric.units();
     for (i, _) in still.iter().enumerate().filter(|(_, still)| **still) {
         normals.push(g, &parts.vector(|j| if j == i { 1.0 } else { 0.0 }));
     }
     w.invariants.iter().for_each(|l| normals.push(g, l));
-    let sharp = normals.project_covector(0, &w.entropy);
+    let sharp = g.sharp(&normals.project_covector(0, &w.entropy));
     let warmed = dot(&w.energy, &sharp);
     warmed.is_finite().then_some(Direction { sharp, warmed })
 }
@@ -91,9 +93,9 @@ pub(super) fn start<L: Lengths>(
     w: &OfLaws<L::Vector>,
 ) -> Option<HeatStart<L>> {
     let still = still(parts, x, w)?;
-    let at = direction(parts, w, &still)?;
+    let at = direction(parts, x, w, &still)?;
     let start = HeatStart { energy: w.energy.clone(), warmed: at.warmed, still };
-    at.is_clear(&w.energy).then_some(start)
+    at.is_clear(parts, &w.energy).then_some(start)
 }
 
 /// A step that heats.
@@ -102,6 +104,7 @@ pub(super) struct Step<'a, L: Lengths> {
     pub(super) tableau: &'static Tableau,
     pub(super) chart: &'a StepChart<L>,
     pub(super) h: f64,
+    pub(super) x: &'a L::State,
     pub(super) start: &'a HeatStart<L>,
     /// Whether friction vanishes at every stage: then nothing is damped, and both laws are corrected.
     pub(super) is_reversible: bool,
@@ -117,7 +120,7 @@ pub(super) fn add<L: Lengths>(
     let s = tableau.stages;
     let (mut sharp, mut warmed, mut units) = (zeros(parts), [0.0; STAGES], [0.0; STAGES]);
     for i in 0..s {
-        let at = direction(parts, &covectors.w[i], &start.still)?;
+        let at = direction(parts, &stages.x[i], &covectors.w[i], &start.still)?;
         (sharp[i], warmed[i]) = (at.sharp, at.warmed);
     }
     if !step.stays_above_zero(stages, &warmed) {
@@ -128,7 +131,7 @@ pub(super) fn add<L: Lengths>(
         entries.fold(0.0, f64::max)
     });
     for i in 0..s {
-        units[i] = sum_of_terms(&largest, &sharp[i]);
+        units[i] = parts.pairing_size(&largest, &sharp[i]);
     }
     let directed = fraction(&warmed[..s], &units[..s]);
     let lost = if is_reversible { 0.0 } else { directed * step.transient(stages, covectors)? };
@@ -188,8 +191,12 @@ impl<L: Lengths> Step<'_, L> {
         let jump = (b.1 - a.1).abs();
         for _ in 0..HALVINGS {
             let q = parts.vector(|c| (a.0[c] + b.0[c]) * 0.5);
-            let w = parts.differentials(&parts.moved(&self.chart.z, &q));
-            let middle = (q, direction(parts, &w, &self.start.still)?.warmed);
+            let y = parts.moved(&self.chart.z, &q);
+            if !parts.is_flat() && parts.is_outside(&y) {
+                return None;
+            }
+            let w = parts.differentials(&y);
+            let middle = (q, direction(parts, &y, &w, &self.start.still)?.warmed);
             if middle.1.signum() == a.1.signum() {
                 a = middle;
             } else {
@@ -206,21 +213,28 @@ impl<L: Lengths> Step<'_, L> {
     /// The fraction `τ` of what is lost that becomes heat: the part of friction in the pairings of the variations of the velocity and
     /// of `dH` in the step.
     fn transient(&self, stages: &StagePoints<L>, covectors: &StageCovectors<L>) -> Option<f64> {
-        let &Self { parts, tableau, start, .. } = self;
+        let &Self { parts, tableau, chart, start, .. } = self;
         let (s, weights) = (tableau.stages, &tableau.weights);
         let mut reversible = zeros(parts);
         for i in 0..s {
-            reversible[i] = parts.reversible(&stages.x[i], &covectors.w[i])?;
+            reversible[i] = parts.reversible(stages.at(i), &covectors.w[i])?;
         }
         let friction =
             each_stage(parts, s, |i| parts.vector(|c| stages.v[i][c] - reversible[i][c]));
+        let nothing = parts.zero();
+        let to_middle = |all: Stages<L::Vector>| {
+            each_stage(parts, s, |i| parts.velocity_at(&chart.z, (&stages.x[i], &nothing), &all[i]))
+        };
+        let back = chart.d.map(|d| d * -0.5);
         let mut sums = [0.0; 2];
-        for (sum, velocity) in sums.iter_mut().zip([&reversible, &friction]) {
+        for (sum, velocity) in sums.iter_mut().zip([reversible, friction].map(to_middle)) {
             let mut mean = parts.zero();
             (0..s).for_each(|i| plus(&mut mean, weights[i], &velocity[i]));
             for i in 0..s {
                 let varied = parts.vector(|c| velocity[i][c] - mean[c]);
-                let paired = dot(&covectors.w[i].energy, &varied) - dot(&start.energy, &varied);
+                let here = parts.velocity_at(&stages.x[i], (&chart.z, &stages.q[i]), &varied);
+                let before = parts.velocity_at(self.x, (&chart.z, &back), &varied);
+                let paired = dot(&covectors.w[i].energy, &here) - dot(&start.energy, &before);
                 *sum += weights[i] * paired.abs();
             }
         }

@@ -7,8 +7,9 @@ use crate::collocation::equation::Left;
 use crate::collocation::linear::{HALF_OF_THE_DIGITS, LEFT, LONGER, MARGIN, PASSES};
 use crate::collocation::tableau::Tableau;
 use crate::implicit::algebra::{Matrix, add, dot, magnitude, vector};
+use crate::implicit::metric::MetricAlong;
 use crate::implicit::parts::{Parts, Second, WithJacobian};
-use crate::implicit::velocity::{VelocityJet, velocity_jet};
+use crate::implicit::velocity::{Turn, VelocityJet, velocity_jet};
 use crate::numbers::{Lengths, List};
 use crate::round_off::bound::ROUNDED;
 use crate::step::Vector as _;
@@ -72,7 +73,9 @@ fn slopes<L: Lengths>(parts: &Parts<'_, L>, z: &L::State) -> Option<VelocityJet<
         let Second { df, hf, .. } = parts.second(law, z);
         WithJacobian { value: df, slope: hf }
     });
-    velocity_jet(parts, z, 1.0, &w)
+    let (metric, one) = (parts.metric(z)?, Matrix::scaled_one(parts.n(), 1.0));
+    let along = MetricAlong::of(&metric, parts.model(), (z, &one));
+    velocity_jet(parts, (z, Turn::Scaled(1.0), along.as_ref()), &w)
 }
 
 impl<L: Lengths> Linear<L> {
@@ -83,6 +86,7 @@ impl<L: Lengths> Linear<L> {
         let jet = slopes(parts, &chart.z)?;
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
         let slope = jet.velocity.slope.map(|slope| slope * h);
+        let slope = chart.map_to_start(parts, x, slope);
         let inverse = parts.matrix(|i, j| one(i, j) - slope[(i, j)] * tableau.gamma).inverse()?;
         let displaced = chart.d.map(f64::abs);
         let mut sizes = parts.scales(x);

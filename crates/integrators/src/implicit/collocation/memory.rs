@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use super::chart::StepChart;
 use super::covectors::{all_finite, combined, each_stage};
 use super::equation::Unknowns;
 use super::linear::Linear;
@@ -12,7 +13,7 @@ use crate::implicit::algebra::Matrix;
 use crate::implicit::drift::Compensation;
 use crate::implicit::parts::Parts;
 use crate::numbers::{Lengths, List};
-use crate::step::{FARTHEST, Memory, RestoreError, Saved};
+use crate::step::{FARTHEST, Memory, RestoreError, Saved, Vector as _};
 
 /// The memory of a method with stages for a model in plain numbers.
 #[doc(hidden)]
@@ -109,9 +110,28 @@ impl<L: Lengths> StageNumbers<L> {
         }))
     }
 
-    /// Notes a step of size `h` with these velocities of its stages.
-    pub(super) fn note(&mut self, tableau: &Tableau, h: f64, k: &Unknowns<L>) {
+    /// Notes a step of size `h` from `x` with these velocities of its stages.
+    pub(super) fn note(
+        &mut self,
+        tableau: &Tableau,
+        (parts, x, h): (&Parts<'_, L>, &L::State, f64),
+        k: &Unknowns<L>,
+    ) {
         let stages = tableau.stages;
+        let carried = (!parts.is_flat()).then(|| {
+            let u = combined(h, stages, &tableau.weights, k);
+            let chart = StepChart::of(parts, x, u)?;
+            let half = chart.d.map(|d| d * 0.5);
+            Some(each_stage(parts, stages, |i| {
+                let middle = chart.to_middle(parts, x, &k[i]);
+                parts.velocity_at(&chart.end, (&chart.z, &half), &middle)
+            }))
+        });
+        let k = match &carried {
+            Some(None) => return self.velocities = None,
+            Some(Some(carried)) => carried,
+            None => k,
+        };
         self.velocities = all_finite::<L>(k).then(|| Continued { k: k.clone(), stages, h });
     }
 }

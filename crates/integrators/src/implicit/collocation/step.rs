@@ -1,6 +1,8 @@
 //! One step of a method with stages of a model in plain numbers: guess, solve, end; then the last digits. As in
 //! [`crate::collocation`], whose rules it follows.
 
+use metriplectic_equations::Path;
+
 use super::covectors::zeros;
 use super::equation::StageEquation;
 use super::fallbacks;
@@ -98,14 +100,21 @@ impl Collocation {
             memory.last = Some(LastStep { k, filter });
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
+        // A root beyond the chart belongs to another way between the ends.
+        if !parts.is_flat()
+            && !equation.chart(&k).is_some_and(|chart| parts.is_near(&chart.z, &at.end))
+        {
+            return Err(failed(Cause::Unsolved));
+        }
         if around.is_outside(&at.end) {
             return Err(failed(Cause::Edge));
         }
-        memory.linear = linear.kept(evaluations);
+        // Elsewhere the frame in which they are formed turns.
+        memory.linear = linear.kept(evaluations).filter(|_| parts.is_flat());
         let u = equation.displacement(&k);
-        memory.note(tableau, h, &k);
+        memory.note(tableau, (parts, x, h), &k);
         memory.last = Some(LastStep { k, filter });
-        let compensated = memory.compensation.add(parts, [x, &at.end], &u);
+        let compensated = memory.compensation.add(parts, Path::Chart, [x, &at.end], &u);
         let (mut x_end, mut after) = match compensated {
             Some(moved) => {
                 let values = parts.laws(&moved);

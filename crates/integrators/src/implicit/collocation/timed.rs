@@ -1,6 +1,8 @@
 //! Steps of a model whose force depends on time and does work: the ports and baths of its surroundings. As in [`crate::collocation`],
 //! whose file of this name has those of typed systems.
 
+use metriplectic_equations::Path;
+
 use super::covectors::{all_finite, combined, each_stage, zeros};
 use super::equation::{StageEquation, Unknowns};
 use super::fallbacks;
@@ -76,9 +78,9 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         let u = equation.displacement(&k);
         let filter = linear.filter().clone();
         memory.linear = linear.kept(evaluations);
-        memory.note(tableau, h, &k);
+        memory.note(tableau, (parts, x, h), &k);
         memory.last = Some(LastStep { k, filter });
-        if let Some(moved) = memory.compensation.add(parts, [x, &solution.end], &u) {
+        if let Some(moved) = memory.compensation.add(parts, Path::Chart, [x, &solution.end], &u) {
             solution.end = moved;
         }
         Ok(solution)

@@ -1,8 +1,8 @@
-//! The equation of one step of the midpoint scheme on a vector space, as in [`Residual`](crate::Residual), whose formula it is.
+//! The equation of one step of the midpoint scheme, as in [`Residual`](crate::Residual), whose formula it is.
 
 use metriplectic_equations::{ENERGY, ENTROPY};
 
-use super::gradient::{LawAlong, Line, Stable};
+use super::gradient::{LawAlong, Line, MovingLine, Stable};
 use crate::implicit::algebra::{Matrix, add, dot, is_finite};
 use crate::implicit::drift;
 use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
@@ -12,7 +12,8 @@ use crate::numbers::Lengths;
 use crate::round_off::bound::{ROUNDED, is_dissipated};
 use crate::step::{Laws, LineOfStep};
 
-/// The equation `F(u) = u − h (Π̃ w_H + K̃ w_S) = 0` of the displacement `u` of a step from `x`.
+/// The equation `F(u) = d − h (Π̃ w_H + K̃ w_S) = 0` of the initial displacement `u` of the path of a step from `x`. On a vector space
+/// the path is a straight line, and `d = u`.
 pub(super) struct Equation<'a, L: Lengths> {
     pub(super) parts: &'a Parts<'a, L>,
     pub(super) line: LineOfStep,
@@ -51,6 +52,8 @@ pub(super) struct Linearised<L: Lengths> {
     pub(super) entropy: L::Vector,
     /// The growth `h⟨w_S, K̃ w_S⟩` of the entropy by friction.
     pub(super) growth: f64,
+    /// The displacement.
+    pub(super) d: L::Vector,
 }
 
 /// The equation at its root, along the end of its step.
@@ -125,20 +128,24 @@ impl<'a, L: Lengths> Equation<'a, L> {
     /// The residual, safe against round-off; `None` where it is not defined.
     pub(super) fn evaluate(&self, u: &L::Vector) -> Option<Evaluated<L>> {
         let &Self { parts, h, .. } = self;
-        let line = &Line::new(parts, self.x, self.line.base, u);
+        let line = &Line::new(parts, self.x, self.line.path, u, false)?;
         let w = parts.each_law(|law| {
             if !self.is_discrete(law) {
-                return parts.jet(law, &line.z).1;
+                return Some(parts.jet(law, &line.z).1);
             }
             let [start, drift] = self.start_of(law);
             let end = parts.value(law, &line.end);
             let along = LawAlong { parts, law, line };
-            along.stable(self.line.gradient, [start, end], false).covector(drift, u)
+            let stable = along.stable(self.line.gradient, [start, end], false)?;
+            Some(stable.covector(drift, line))
         });
-        let friction = parts.irreversible(&line.z, &w)?;
+        let w = w.all()?;
+        let at = (&line.z, line.units());
+        let friction = parts.irreversible(at, &w)?;
         let production = dot(&w.entropy, &friction);
-        let reversible = parts.reversible(&line.z, &w)?;
-        let residual = parts.vector(|i| u[i] - (reversible[i] + friction[i]) * h);
+        let reversible = parts.reversible(at, &w)?;
+        let d = line.d();
+        let residual = parts.vector(|i| d[i] - (reversible[i] + friction[i]) * h);
         let evidence = self.dissipated(&w.entropy, production);
         is_finite(&residual).then_some(Evaluated { residual, evidence })
     }
@@ -150,46 +157,53 @@ impl<'a, L: Lengths> Equation<'a, L> {
         &self,
         line: &Line<'_, L>,
         mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Matrix<L>,
-    ) -> OfLaws<WithJacobian<L>> {
+    ) -> Option<OfLaws<WithJacobian<L>>> {
         let parts = self.parts;
-        parts.each_law(|law| {
+        let w = parts.each_law(|law| {
             if !self.is_discrete(law) {
                 let second = parts.second(law, &line.z);
-                let slope = second.hf.map(|h| h * line.c);
-                return WithJacobian { value: second.df, slope };
+                let slope = line.dz().after(&second.hf);
+                return Some(WithJacobian { value: second.df, slope });
             }
             let [start, drift] = self.start_of(law);
             let (end, df) = parts.jet(law, &line.end);
             let along = LawAlong { parts, law, line };
-            let stable = along.stable(self.line.gradient, [start, end], true);
-            WithJacobian { value: stable.covector(drift, line.d), slope: slope(law, stable, &df) }
-        })
+            let stable = along.stable(self.line.gradient, [start, end], true)?;
+            let value = stable.covector(drift, line);
+            Some(WithJacobian { value, slope: slope(law, stable, &df) })
+        });
+        w.all()
     }
 
-    /// The Jacobian `1 − h ∂V` of the residual, from the derivatives of the velocity.
+    /// The Jacobian `∂d − h ∂V` of the residual, from the derivatives of the velocity.
     #[inline]
-    fn jacobian(&self, velocity: &Matrix<L>) -> Matrix<L> {
+    fn jacobian(&self, line: &Line<'_, L>, velocity: &Matrix<L>) -> Matrix<L> {
         let mut jacobian = velocity.map(|slope| -(slope * self.h));
+        if let Some([_, dd, _]) = line.slopes() {
+            jacobian.add(1.0, dd);
+            return jacobian;
+        }
         for i in 0..self.parts.n() {
             jacobian[(i, i)] += 1.0;
         }
         jacobian
     }
 
-    /// The Jacobian at the root `u`, for the derivative of the step: numbers that are divided by its length are zero where they are
-    /// round-off. `None` where it is not defined.
+    /// The Jacobian at the root `u`, for the derivative of the step on a vector space: numbers that are divided by its length are zero where
+    /// they are round-off. `None` where it is not defined.
     pub(super) fn at_root(&self, u: &L::Vector) -> Option<FromEnd<L>> {
         let &Self { parts, h, .. } = self;
-        let line = &Line::new(parts, self.x, self.line.base, u);
+        let line = &Line::new(parts, self.x, self.line.path, u, true)?;
+        let along = &MovingLine { line, metric: None };
         let mut energy = parts.zero();
         let w = self.jets(line, |law, stable, df| {
             if law == ENERGY {
                 energy = df.clone();
             }
-            stable.slope_above_round_off(u, df)
-        });
-        let jet = whole_velocity_jet(parts, &line.z, line.c, &w)?;
-        let jacobian = self.jacobian(&jet.velocity.slope);
+            stable.slope_above_round_off(along, df)
+        })?;
+        let jet = whole_velocity_jet(parts, &line.z, self.line.path.base(), &w)?;
+        let jacobian = self.jacobian(line, &jet.velocity.slope);
         let mut growth = parts.zero();
         if let Some(friction) = &jet.irreversible {
             add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
@@ -201,17 +215,20 @@ impl<'a, L: Lengths> Equation<'a, L> {
     /// The residual with its Jacobian; `None` where it is not defined.
     pub(super) fn linearise(&self, u: &L::Vector) -> Option<Linearised<L>> {
         let &Self { parts, h, .. } = self;
-        let line = &Line::new(parts, self.x, self.line.base, u);
+        let line = &Line::new(parts, self.x, self.line.path, u, true)?;
+        let metric = line.moving_metric(parts);
+        let (metric, d) = (metric.as_ref(), line.d());
+        let along = &MovingLine { line, metric };
         let mut noise = None;
         let w = self.jets(line, |law, stable, df| {
             if law == ENERGY {
                 // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
-                let of_defect = stable.noise(u);
+                let of_defect = stable.noise(line);
                 noise = Some(parts.vector(|i| of_defect[i] + df[i].abs() * f64::EPSILON));
             }
-            stable.slope(self.start_of(law)[1], u, df)
-        });
-        let jet = velocity_jet(parts, &line.z, line.c, &w)?;
+            stable.slope(self.start_of(law)[1], along, df)
+        })?;
+        let jet = velocity_jet(parts, (&line.z, line.dz(), metric), &w)?;
         let VelocityJet { velocity, terms, sensitivity, production, friction, rotation, .. } = jet;
         let rounding = Rounding {
             // What underflows is no larger than the least normal number.
@@ -221,15 +238,15 @@ impl<'a, L: Lengths> Equation<'a, L> {
             covector: noise.unwrap_or_else(|| parts.zero()),
             argument: {
                 let sizes = parts.scales(self.x);
-                parts.vector(|i| (sizes[i] + u[i].abs()) * f64::EPSILON)
+                parts.vector(|i| (sizes[i] + d[i].abs()) * f64::EPSILON)
             },
         };
         // Half of a displacement reaches z.
         let stiffness =
             Stiffness { friction: 2.0 * h.abs() * friction, rotation: 2.0 * h.abs() * rotation };
         let evidence = self.dissipated(&w.entropy.value, production);
-        let residual = parts.vector(|i| u[i] - velocity.value[i] * h);
-        let jacobian = self.jacobian(&velocity.slope);
+        let residual = parts.vector(|i| d[i] - velocity.value[i] * h);
+        let jacobian = self.jacobian(line, &velocity.slope);
         let is_usable = is_finite(&residual) && jacobian.magnitude().is_finite();
         is_usable.then(|| Linearised {
             residual,
@@ -240,6 +257,7 @@ impl<'a, L: Lengths> Equation<'a, L> {
             energy: w.energy.value,
             entropy: w.entropy.value,
             growth: h * production,
+            d: d.clone(),
         })
     }
 }

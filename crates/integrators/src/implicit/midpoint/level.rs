@@ -5,7 +5,8 @@ use metriplectic_equations::{ENERGY, ENTROPY};
 use super::equation::{Equation, Linearised};
 use super::newton::Root;
 use crate::implicit::algebra::{add, dot, magnitude};
-use crate::implicit::orthogonal::{Orthogonal, Units};
+use crate::implicit::metric::Units;
+use crate::implicit::orthogonal::Orthogonal;
 use crate::numbers::Lengths;
 use crate::round_off::bound::ROUNDED;
 use crate::step::Effort;
@@ -85,13 +86,19 @@ impl<L: Lengths> Equation<'_, L> {
         // Where the round-off of the equation is near that of the entries of x', an error within the roundings of the energy's terms
         // needs no correction.
         let is_coarse = *residual_bound > 2.0 * ROUNDED * magnitude(self.x);
-        if !is_coarse && e.abs() <= ROUNDED * self.parts.size_of_terms(ENERGY, end) {
+        let is_closed = self.has_closed_geodesics();
+        if is_closed && !is_coarse && e.abs() <= ROUNDED * self.parts.size_of_terms(ENERGY, end) {
             return None;
+        }
+        if !is_closed && let Some(end) = self.moved_onto_level(u, end) {
+            return Some(Polished { u: u.clone(), end, moved: true, evaluated: None });
         }
         let balanced = self.corrected(u, e, None);
         let balanced = balanced.filter(|(_, end)| self.imbalance(end).abs() < e.abs());
         let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
-        if let Some(end) = self.moved_onto_level(u, at) {
+        if (is_closed || balanced.is_some())
+            && let Some(end) = self.moved_onto_level(u, at)
+        {
             return Some(Polished { u: u.clone(), end, moved: true, evaluated: None });
         }
         balanced.map(|(u, end)| Polished { u, end, moved: false, evaluated: None })
@@ -129,11 +136,11 @@ impl<L: Lengths> Equation<'_, L> {
         let parts = self.parts;
         let at = self.linearise(u)?;
         let rounding = at.rounding.bounds(parts, &at.jacobian);
-        let Linearised { residual, jacobian, energy, entropy, growth, .. } = at;
+        let Linearised { residual, jacobian, energy, entropy, growth, d, .. } = at;
         // Each component takes its part in units of its own round-off, and of what is left of it.
         let bounds =
-            parts.vector(|i| (rounding[i] + u[i].abs() * f64::EPSILON) + residual[i].abs());
-        let g = Units::Sizes(&bounds);
+            parts.vector(|i| (rounding[i] + d[i].abs() * f64::EPSILON) + residual[i].abs());
+        let g: Units<'_, L> = Units::Sizes(&bounds);
         let mut exact = residual.clone();
         let mut across = Orthogonal::none();
         let of_entropy = change.map(|change| (entropy, change - growth));
@@ -145,12 +152,18 @@ impl<L: Lengths> Equation<'_, L> {
         }
         let step = jacobian.solve(&exact)?;
         let u = parts.vector(|i| u[i] - step[i]);
-        let end = parts.moved(self.x, &u);
+        let end = parts.end(self.line.path, self.x, &u)?;
         let is_within = |i: usize| (exact[i] - residual[i]).abs() <= bounds[i];
         (0..parts.n()).all(is_within).then_some((u, end))
     }
 
-    /// The end `x'` moved onto the level of the energy by the shortest way, within a rounding.
+    /// Whether the ends of paths are good to a few roundings.
+    fn has_closed_geodesics(&self) -> bool {
+        self.parts.accuracy(self.line.path) <= ROUNDED
+    }
+
+    /// The end `x'` moved onto the level of the energy, within the accuracy of paths: by the shortest way within a rounding; beyond it
+    /// along the levels of the entropy and the further invariants, or of the entropy alone.
     fn moved_onto_level(&self, u: &L::Vector, end: &L::State) -> Option<L::State> {
         let Self { parts, x, values, .. } = self;
         let e = self.imbalance(end);
@@ -160,14 +173,31 @@ impl<L: Lengths> Equation<'_, L> {
         // The entries of x' = x + u are rounded in units of x and of u, however small they are.
         let of_x = parts.scales(x);
         let sizes = parts.vector(|i| of_x[i] + u[i].abs());
-        let (_, w) = parts.jet(ENERGY, end);
-        let limit = ROUNDED * (parts.n() as f64).sqrt();
-        let across = Units::Sizes(&sizes).sharp(&w);
-        let c = -e / dot(&across, &w);
-        let step = parts.vector(|i| across[i] * c);
-        let is_within = (0..parts.n()).all(|i| step[i].abs() <= limit * sizes[i]);
-        let moved = parts.moved(end, &step);
-        let is_better = self.imbalance(&moved).abs() < e.abs();
-        (is_within && is_better).then_some(moved)
+        let g: Units<'_, L> = Units::Sizes(&sizes);
+        let accuracy = parts.accuracy(self.line.path).max(ROUNDED);
+        let limit = accuracy * (parts.n() as f64).sqrt();
+        let moved = |kept: &Orthogonal<L>, w: &L::Vector| {
+            let across = g.sharp(&kept.project_covector(0, w));
+            let c = -e / dot(&across, w);
+            let step = parts.vector(|i| across[i] * c);
+            let is_within = (0..parts.n()).all(|i| step[i].abs() <= limit * sizes[i]);
+            let moved = parts.moved(end, &step);
+            let is_better = self.imbalance(&moved).abs() < e.abs();
+            (is_within && is_better).then_some(moved)
+        };
+        if self.has_closed_geodesics() {
+            return moved(&Orthogonal::none(), &parts.jet(ENERGY, end).1);
+        }
+        let w = parts.differentials(end);
+        let along_entropy = || {
+            let mut kept = Orthogonal::none();
+            if self.is_exact() {
+                kept.push(g, &w.entropy);
+            }
+            kept
+        };
+        let mut kept = along_entropy();
+        w.invariants.iter().for_each(|l| kept.push(g, l));
+        moved(&kept, &w.energy).or_else(|| moved(&along_entropy(), &w.energy))
     }
 }

@@ -138,8 +138,8 @@ impl<L: Lengths> Predictor<L> {
         Some(sum)
     }
 
-    /// Notes the displacement `d` of a step.
-    pub(super) fn note(&mut self, parts: &Parts<'_, L>, d: &L::Vector) {
+    /// Notes the displacement `d` of a step between two states.
+    pub(super) fn note(&mut self, parts: &Parts<'_, L>, [x, end]: [&L::State; 2], d: &L::Vector) {
         let mut difference = d.clone();
         for last in &mut self.0 {
             let next = parts.vector(|i| difference[i] - last[i]);
@@ -148,6 +148,7 @@ impl<L: Lengths> Predictor<L> {
         if self.0.len() < DIFFERENCES {
             self.0.push(difference);
         }
+        parts.transport(x, end, &mut self.0);
     }
 
     /// Rescales the displacements to steps of another size, on the parabola through the last three.

@@ -2,7 +2,7 @@
 //! name has the reasons.
 
 use crate::implicit::algebra::{add, dot};
-use crate::implicit::orthogonal::{Orthogonal, Units};
+use crate::implicit::orthogonal::Orthogonal;
 use crate::implicit::start::Start;
 use crate::midpoint::restored::{CORRECTIONS, EXACT, KEPT, NEAR};
 use crate::numbers::{Lengths, List};
@@ -78,7 +78,7 @@ impl<'a, L: Lengths> Wanted<'a, L> {
         }
         let (parts, mut y) = (self.start.parts, end.clone());
         for _ in 0..CORRECTIONS {
-            y = parts.moved(&y, &self.correction(&y, &there));
+            y = parts.moved(&y, &self.correction(&y, &there)?);
             there = parts.laws(&y);
             let moved = relative(&parts.between(end, &y), &self.units);
             if moved > NEAR * self.length || moved.is_nan() {
@@ -113,8 +113,10 @@ impl<'a, L: Lengths> Wanted<'a, L> {
     }
 
     /// The shortest displacement that has the missing parts of the laws, one law after the other.
-    fn correction(&self, y: &L::State, there: &Laws<L::Invariants>) -> L::Vector {
-        let (parts, g) = (self.start.parts, Units::Canonical);
+    fn correction(&self, y: &L::State, there: &Laws<L::Invariants>) -> Option<L::Vector> {
+        let parts = self.start.parts;
+        let metric = parts.metric(y)?;
+        let g = metric.units();
         let w = parts.differentials(y);
         let (mut normals, mut d) = (Orthogonal::none(), parts.zero());
         let further =
@@ -125,7 +127,7 @@ impl<'a, L: Lengths> Wanted<'a, L> {
         let of_energy = std::iter::once((&w.energy, self.laws.energy - there.energy));
         let of_entropy = (fall > 0.0).then_some((&w.entropy, fall));
         for (dl, missing) in of_energy.chain(further).chain(of_entropy) {
-            let sharp = normals.project_covector(0, dl);
+            let sharp = g.sharp(&normals.project_covector(0, dl));
             let known = normals.len();
             normals.push(g, dl);
             if normals.len() > known {
@@ -133,7 +135,7 @@ impl<'a, L: Lengths> Wanted<'a, L> {
                 add(&mut d, c, &sharp);
             }
         }
-        d
+        Some(d)
     }
 }
 

@@ -136,15 +136,19 @@ impl Midpoint {
         let &Start { parts, x, .. } = start;
         let Solved { equation, root, effort, evidence } = self.solved(start, memory, fallbacks)?;
         let edge = || StepFailure { residual: root.residual, cause: Cause::Edge, effort };
-        let c = equation.line.base;
-        let z = parts.moved(x, &parts.vector(|i| root.u[i] * c));
+        let path = equation.line.path;
+        let z = if parts.is_flat() {
+            parts.moved(x, &parts.vector(|i| root.u[i] * path.base()))
+        } else {
+            parts.curved_path(path, x, &root.u, false).ok_or_else(edge)?.z
+        };
         let Linearised { energy, entropy, .. } = equation.linearise(&root.u).ok_or_else(edge)?;
         let end = if evidence.rests {
             x.clone()
         } else {
-            let end = parts.moved(x, &root.u);
-            memory.predictor.note(parts, &root.u);
-            memory.compensation.add(parts, [x, &end], &root.u).unwrap_or(end)
+            let end = parts.end(path, x, &root.u).ok_or_else(edge)?;
+            memory.predictor.note(parts, [x, &end], &root.u);
+            memory.compensation.add(parts, path, [x, &end], &root.u).unwrap_or(end)
         };
         Ok(Solution { end, z, energy, entropy, evidence, effort })
     }
@@ -165,7 +169,8 @@ impl Midpoint {
             // What the solver found is its own round-off, and following it would make a random walk of the energy.
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
-        let end = parts.moved(x, &root.u);
+        let path = equation.line.path;
+        let end = parts.end(path, x, &root.u).ok_or_else(|| failed(Cause::Edge, effort))?;
         // Where the laws hold at the point with the digits that earlier steps have lost, the step goes there.
         let shifted = memory.compensation.shifted(parts, &end);
         let held = shifted.and_then(|shifted| equation.held(&shifted));
@@ -177,12 +182,12 @@ impl Midpoint {
         if around.is_outside(&end) {
             return Err(failed(Cause::Edge, effort).into());
         }
-        memory.predictor.note(parts, &u);
+        memory.predictor.note(parts, [x, &end], &u);
         let compensated = if moved {
             memory.compensation.0 = None;
             None
         } else {
-            memory.compensation.add(parts, [x, &end], &u)
+            memory.compensation.add(parts, path, [x, &end], &u)
         };
         let evaluated = if compensated.is_some() { held } else { evaluated };
         let x_end = compensated.unwrap_or(end);

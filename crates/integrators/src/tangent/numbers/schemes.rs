@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::ENTROPY;
+use metriplectic_equations::{ENTROPY, Path};
 use nalgebra::{DMatrix, DVector};
 
 use super::super::error::Unlinearised;
@@ -24,7 +24,7 @@ use crate::step::{GradientKind, LineOfStep};
 
 /// Returns whether a step is the same seen from either end.
 pub(in crate::tangent) fn is_self_adjoint(line: LineOfStep) -> bool {
-    line.base.to_bits() == 0.5_f64.to_bits() && line.gradient != GradientKind::ItohAbe
+    line.path != Path::Exponential && line.gradient != GradientKind::ItohAbe
 }
 
 /// Both linearisations of a step, in units of the entries.

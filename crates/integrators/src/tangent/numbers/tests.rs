@@ -6,7 +6,7 @@ use metriplectic_dynamics::{
     FieldDissipation, InNumbers, Metriplectic, Poisson, Symplectic, System,
 };
 use metriplectic_equations::{
-    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, SecondLaw, Sizes, laws,
+    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, Path, SecondLaw, Sizes, laws,
 };
 use metriplectic_fields::{Dimension as _, Real};
 use metriplectic_manifolds::{
@@ -34,7 +34,7 @@ enum Steps {
 
 impl Steps {
     fn along(gradient: GradientKind) -> Self {
-        Self::Along(LineOfStep { base: 0.5, gradient })
+        Self::Along(LineOfStep { path: Path::Weyl, gradient })
     }
 
     fn name(self) -> String {
@@ -647,9 +647,9 @@ fn a_scheme_that_is_not_symmetric_is_refused() {
     let (numbers, targets) = (InNumbers(&system), no_targets());
     let (x, end) = ([0.7, -0.4], [0.5, -0.6]);
     let step = step_of(&numbers, [&x, &end], 0.3, &targets);
-    let lines = [(0.5, GradientKind::ItohAbe), (0.0, GradientKind::Gonzalez)];
-    for (base, gradient) in lines {
-        let steps = Steps::Along(LineOfStep { base, gradient });
+    let lines = [(Path::Weyl, GradientKind::ItohAbe), (Path::Exponential, GradientKind::Gonzalez)];
+    for (path, gradient) in lines {
+        let steps = Steps::Along(LineOfStep { path, gradient });
         let costate = DVector::zeros(2);
         assert_eq!(steps.derivative(&step).unwrap_err(), Unlinearised::NotSymmetric);
         assert_eq!(steps.pull_back(&step, &costate).unwrap_err(), Unlinearised::NotSymmetric);

@@ -41,7 +41,7 @@ impl Heating<'_> {
                 normals.push(&WithJacobian { value, slope: Matrix::zeros(n) });
             }
             w.invariants.iter().for_each(|l| normals.push(l));
-            Some([normals.projected(0, &w.entropy)])
+            Some([normals.covector(0, &w.entropy)])
         })?;
         Ok(sharp)
     }

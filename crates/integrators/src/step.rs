@@ -46,8 +46,8 @@ pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
 pub(crate) use flow::AnyFlow;
 pub use flow::{
-    Element, Flow, FlowVisitor, Laws, Listed, PlainFlow, PlainNumbers, Recheck, StateSpace,
-    Written, in_room,
+    Element, Flow, FlowVisitor, HasFlow, Laws, Listed, PlainFlow, PlainNumbers, Recheck,
+    StateSpace, Written, in_room,
 };
 pub(crate) use initial_scales::{CUT, CUTS, SAME, classical_step, initial_scales};
 pub use inlined::Inlined;

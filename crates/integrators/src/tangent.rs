@@ -63,6 +63,7 @@ mod tape;
 /// The most corrections of a root, which converge quadratically.
 const CORRECTIONS: usize = 10;
 
+pub use crate::step::HasFlow;
 pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
 pub use along::LinearisedAlong;
 pub use certificate::Sensitivity;
@@ -76,7 +77,7 @@ pub use linearised::{Linearised, Piece, Propagated, Targets};
 pub use part::Part as StepPart;
 pub use record::{TangentRun, Tangents};
 pub use schemes::SelfAdjoint;
-pub use smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf};
+pub use smooth::{FlowOf, SmoothFlow, SpaceOf};
 pub use state::TangentState;
 pub use steps::TangentSteps;
 pub use systems::{SystemAt, Systems};

@@ -6,7 +6,7 @@ use crate::run::plain::Whole;
 use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
-use crate::step::{Element, Flow, Stepper, in_room};
+use crate::step::{Element, Flow, HasFlow, Stepper, in_room};
 
 /// Runs of a one-step method. Every [`Stepper`] is one, and a retraction of this library too:
 /// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))` takes the steps of its [`Scheme`](crate::Scheme) with the default
@@ -18,13 +18,13 @@ pub trait Method<F: Flow>: Stepper<F> {
     /// # Errors
     ///
     /// [`RunError`] if the model breaks a law or the schedule cannot be run.
-    fn steps(
+    fn steps<'a, Y: HasFlow<Flow = F>>(
         self,
-        flow: &F,
+        system: &'a Y,
         x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
-        let schedule = schedule.into();
+    ) -> Result<Steps<'a, F, Self>, RunError<F::Space>> {
+        let (flow, schedule) = (system.as_flow(), schedule.into());
         in_room(flow, || Steps::start(self, flow, x0, schedule))
     }
 
@@ -33,14 +33,14 @@ pub trait Method<F: Flow>: Stepper<F> {
     /// # Errors
     ///
     /// [`RunError`]; if a step failed, the trajectory so far is in it.
-    fn run(
+    fn run<Y: HasFlow<Flow = F>>(
         self,
-        flow: &F,
+        system: &Y,
         x0: Element<F>,
         schedule: impl Into<Schedule>,
     ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let schedule = schedule.into();
-        flow.visit(Whole { method: self, x0, schedule })
+        system.as_flow().visit(Whole { method: self, x0, schedule })
     }
 
     /// Takes up a run where it was put down. With the system and the method of that run the steps
@@ -50,11 +50,12 @@ pub trait Method<F: Flow>: Stepper<F> {
     ///
     /// [`ResumeError`] if the checkpoint does not belong to the system or to the method, or if its file has
     /// changed.
-    fn resume<'a>(
+    fn resume<'a, Y: HasFlow<Flow = F>>(
         self,
-        flow: &'a F,
+        system: &'a Y,
         checkpoint: &Checkpoint,
     ) -> Result<Steps<'a, F, Self>, ResumeError> {
+        let flow = system.as_flow();
         in_room(flow, || Steps::resume(self, flow, checkpoint))
     }
 }

@@ -55,7 +55,7 @@ use std::fmt;
 use std::io::{self, Seek, Write};
 
 use crate::run::state::State;
-use crate::step::{Flow, StateSpace};
+use crate::step::{Flow, HasFlow, StateSpace};
 
 pub use csv::{Csv, quoted};
 pub use npy::{Npy, npy_header};
@@ -109,7 +109,7 @@ impl<'a, M: StateSpace> Observables<'a, M> {
 
     /// The time alone, for runs of this system: the compiler then knows the points of the closures.
     #[must_use]
-    pub fn on<F: Flow<Space = M>>(_flow: &F) -> Self {
+    pub fn on<Y: HasFlow<Flow: Flow<Space = M>>>(_system: &Y) -> Self {
         Self::new()
     }
 

@@ -493,3 +493,20 @@ pub trait Flow {
         None
     }
 }
+
+/// A flow, or a system at values of parameters whose runs are those of a flow.
+pub trait HasFlow {
+    /// The flow of its runs.
+    type Flow: Flow;
+
+    /// Returns the flow.
+    fn as_flow(&self) -> &Self::Flow;
+}
+
+impl<F: Flow> HasFlow for F {
+    type Flow = F;
+
+    fn as_flow(&self) -> &F {
+        self
+    }
+}

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 use super::differentiated::Differentiated;
 use super::error::TangentError;
 use super::part::Part;
-use super::smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf, VectorOf};
+use super::smooth::{FlowOf, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::in_wide_room;
 use super::tape::{Segment, Tape, TapedStep};
 use crate::run::certificate::Certificate;
@@ -17,7 +17,7 @@ use crate::run::ending::Ending;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
-use crate::step::{Element, Stepper};
+use crate::step::{Element, HasFlow, Stepper};
 
 /// Runs whose losses have gradients, by every method whose steps are [differentiated](Differentiated).
 ///

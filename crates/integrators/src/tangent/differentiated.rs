@@ -13,9 +13,9 @@ use super::columns::{Carried, Columns, LawRows, Moved};
 use super::error::Unlinearised;
 use super::linearised::{Linearised, Propagated};
 use super::part::{Part, Wide};
-use super::smooth::{FlowOf, HasFlow, SmoothFlow, matrix, numbers};
+use super::smooth::{FlowOf, SmoothFlow, matrix, numbers};
 use crate::noise::{Fluctuating, Noisy};
-use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
+use crate::step::{Compiled, Dim, Element, Flow as _, HasFlow, Stepper, Vector as _};
 
 /// A system whose runs by the method `M` have derivatives along their start and along parameters.
 ///
@@ -34,7 +34,7 @@ use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
     note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev`, `ExplicitRungeKutta`, `Gauss` and `Radau` have one on every space of \
             this library (`MovingBase`)"
 )]
-pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow {
+pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow<Flow: SmoothFlow> {
     /// A state and parameters whose entries carry derivatives, of the closures of a jump.
     type MovingWide: 'static;
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::columns::{LawRows, jets};
 use super::frames::between;
 use crate::noise::{Fluctuating, Noisy};
-use crate::step::{Dim, Element, Flow};
+use crate::step::{Dim, Element, Flow, HasFlow};
 
 /// A flow whose laws have differentials, and whose states may carry derivatives.
 ///
@@ -56,23 +56,6 @@ pub trait SmoothFlow: Flow + Sized {
 
     /// Computes the coordinates of a moving state around `y`, with their first derivative. A ledger has none.
     fn coordinates(&self, y: &Element<Self>, there: &Self::Moving) -> Vec<[f64; 2]>;
-}
-
-/// A flow, or one at values of parameters.
-pub trait HasFlow {
-    /// The flow of its runs.
-    type Flow: SmoothFlow;
-
-    /// Returns the flow.
-    fn as_flow(&self) -> &Self::Flow;
-}
-
-impl<F: SmoothFlow> HasFlow for F {
-    type Flow = F;
-
-    fn as_flow(&self) -> &F {
-        self
-    }
 }
 
 /// The flow of a system.

@@ -11,8 +11,8 @@ use super::columns::{Carried, LawRows, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
 use super::part::Part;
-use super::smooth::{HasFlow, SmoothFlow};
-use crate::step::{Element, Stepper, Vector as _};
+use super::smooth::SmoothFlow;
+use crate::step::{Element, Flow, HasFlow, Stepper, Vector as _};
 
 /// Systems of any kind with named parameters: with ports, baths and noise, lattices, systems of your own.
 ///
@@ -22,7 +22,7 @@ use crate::step::{Element, Stepper, Vector as _};
 /// ```
 /// use metriplectic_dynamics::{Symplectic, System};
 /// use metriplectic_fields::Real;
-/// use metriplectic_integrators::{DormandPrince8, OpenBuilder as _, Span, Systems, Tangents as _};
+/// use metriplectic_integrators::{DormandPrince8, Method as _, OpenBuilder as _, Span, Systems, Tangents as _};
 /// use metriplectic_manifolds::Euclidean;
 /// use nalgebra::{Vector1, Vector2, vector};
 /// use num_dual::DualNum as _;
@@ -42,7 +42,8 @@ use crate::step::{Element, Stepper, Vector as _};
 /// println!("∂x/∂k = {}", run.last().along("stiffness").unwrap());
 /// let work = run.last().work_along("push").unwrap();
 /// println!("∂W/∂k = {}", work[work.len() - 1]);
-/// # assert!(work[work.len() - 1].abs() > 0.01);
+/// let plain = DormandPrince8.run(&system, system.start(vector![1.0, 0.0]), Span::steps(0.1, 50))?;
+/// # assert!(work[work.len() - 1].abs() > 0.01 && plain.certificate().keeps_energy());
 /// # Ok(())
 /// # }
 /// ```
@@ -101,7 +102,7 @@ impl<B, const P: usize> Systems<B, P> {
 /// The system beside one, by what its parameters are displaced.
 type SystemBeside<'a, S> = Box<dyn Fn(&[f64]) -> Result<S, ()> + 'a>;
 
-/// A system of any kind at values of parameters; made by [`Systems::at`].
+/// A system of any kind at values of parameters; made by [`Systems::at`]. Runs and tangents take it as they take the system.
 pub struct SystemAt<'a, S> {
     system: S,
     names: &'a [&'static str],
@@ -144,7 +145,7 @@ impl<S> SystemAt<'_, S> {
     }
 }
 
-impl<S: SmoothFlow> HasFlow for SystemAt<'_, S> {
+impl<S: Flow> HasFlow for SystemAt<'_, S> {
     type Flow = S;
 
     fn as_flow(&self) -> &S {

@@ -6,7 +6,7 @@ use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
 use super::part::{Again, Ended, Part, memory_before};
 use super::pieces::parts;
-use super::smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf, VectorOf};
+use super::smooth::{FlowOf, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::again;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
@@ -18,7 +18,7 @@ use crate::run::rounding::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::step::{Element, Flow, Stepper};
+use crate::step::{Element, Flow, HasFlow, Stepper};
 
 /// A step of a run.
 pub(super) struct TapedStep<F: Flow> {

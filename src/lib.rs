@@ -85,7 +85,7 @@ pub use nalgebra;
 pub mod prelude {
     pub use metriplectic_dynamics::{
         AlmostPoisson, AreaForm, Bath, Boltzmann, CasimirDissipation, CometricDissipation, Contact,
-        Differentiable, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu,
+        Differentiable, Erase, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu,
         Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu,
         OnsagerDissipation, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
         VectorField, Verify, Zero,

@@ -69,6 +69,6 @@ pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};
 pub use metriplectic_equations::{LawResidual, ModelError, Report, model_error, report};
 pub use noise::{Boltzmann, NoiseTerms};
-pub use system::{BuildError, NoEntropy, System};
+pub use system::{BuildError, Erase, NoEntropy, System};
 pub use vector_field::VectorField;
 pub use verification::{Verified, Verify};

@@ -141,17 +141,46 @@ impl<M: Space, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
         H: ScalarField<M> + Send + Sync + 'static,
         S: ScalarField<M> + Send + Sync + 'static,
     {
-        let Fields { energy, entropy, invariants } = self.fields;
-        let [energy, entropy] = [ErasedField::new(energy), ErasedField::new(entropy)];
-        System {
-            tensors: self.tensors,
-            fields: Fields { energy, entropy, invariants },
-            second_law: self.second_law,
-        }
+        self.map_fields(ErasedField::new, ErasedField::new)
+    }
+}
+
+/// A system whose energy and entropy can be moved behind pointers, as [`System::erased`] does: a member of a family, an open
+/// system, one with noise too. Ports, baths and all other parts keep their types. A system in plain numbers is moved as a whole.
+pub trait Erase: Sized {
+    /// The same system with energy and entropy behind pointers.
+    type Erased;
+
+    /// Moves energy and entropy behind pointers.
+    fn erased(self) -> Self::Erased;
+}
+
+impl<M, G, B, K, H, S, L> Erase for System<M, G, B, K, H, S, L>
+where
+    M: Space,
+    H: ScalarField<M> + Send + Sync + 'static,
+    S: ScalarField<M> + Send + Sync + 'static,
+{
+    type Erased = System<M, G, B, K, ErasedField<M>, ErasedField<M>, L>;
+
+    fn erased(self) -> Self::Erased {
+        Self::erased(self)
     }
 }
 
 impl<M, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
+    /// Replaces energy and entropy by other forms of the same functions.
+    #[doc(hidden)]
+    pub fn map_fields<E, F>(
+        self,
+        energy: impl FnOnce(H) -> E,
+        entropy: impl FnOnce(S) -> F,
+    ) -> System<M, G, B, K, E, F, L> {
+        let Fields { energy: h, entropy: s, invariants } = self.fields;
+        let fields = Fields { energy: energy(h), entropy: entropy(s), invariants };
+        System { tensors: self.tensors, fields, second_law: self.second_law }
+    }
+
     /// Puts parts together that belong to a system which has been checked.
     pub(crate) fn frozen(
         manifold: M,

@@ -10,9 +10,10 @@ mod rows;
 mod stages;
 
 use std::fmt;
+use std::sync::Arc;
 
 use metriplectic_dynamics::invariants::Kind;
-use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_dynamics::{Erase, ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
@@ -126,6 +127,15 @@ impl<S: Equations> FromEquations<S> {
     /// The errors of [`verify`](Self::verify).
     pub fn verified(self, x0: &[f64]) -> Result<FromEquations<VerifiedEquations<S>>, ModelError> {
         VerifiedEquations::around(self.0, x0).map(FromEquations)
+    }
+}
+
+impl<S: Equations + Send + Sync + 'static> Erase for FromEquations<S> {
+    type Erased = FromEquations<Arc<dyn Equations + Send + Sync>>;
+
+    /// Moves the whole system behind a pointer.
+    fn erased(self) -> Self::Erased {
+        FromEquations(Arc::new(self.0))
     }
 }
 

@@ -48,7 +48,7 @@ mod verify;
 mod view;
 
 pub use builder::{OpenBuilder, Opened, Opening};
-pub use clock::{AtTime, Clock, InTime, Still};
+pub use clock::{AtTime, Clock, InTime, OfTime, Still};
 pub use in_numbers::{Exchanged, OpenFlow, OpenSteps};
 pub use projection::OpenGradients;
 pub use stages::NotDamped;

@@ -12,7 +12,7 @@ use crate::dissipation::Dissipation;
 use crate::invariants::Invariants;
 use crate::metriplectic::{Metriplectic, Point, SecondLaw};
 use crate::parts_of;
-use crate::system::System;
+use crate::system::{Erase, System};
 
 /// A [`Family`](crate::Family) at one `θ`: a system on `M`, which remembers its parameters.
 pub struct Frozen<N, Y, const P: usize> {
@@ -39,6 +39,21 @@ impl<N, Y, const P: usize> Frozen<N, Y, P> {
     /// The parameters.
     pub const fn theta(&self) -> &SVector<f64, P> {
         &self.theta
+    }
+
+    /// Returns the system without its parameters.
+    pub fn into_system(self) -> N {
+        self.narrow
+    }
+}
+
+impl<N: Erase, Y: Erase + Clone, const P: usize> Erase for Frozen<N, Y, P> {
+    type Erased = Frozen<N::Erased, Y::Erased, P>;
+
+    fn erased(self) -> Self::Erased {
+        let Self { narrow, wide, theta, names, tensors_depend } = self;
+        let wide = Arc::new(Arc::unwrap_or_clone(wide).erased());
+        Frozen { narrow: narrow.erased(), wide, theta, names, tensors_depend }
     }
 }
 

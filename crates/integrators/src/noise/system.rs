@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use metriplectic_dynamics::Erase;
+
 use super::error::NoiseError;
 use super::fluctuating::{Fluctuating, Noise};
 use crate::step::Element;
@@ -51,6 +53,15 @@ impl<F, U> Noisy<F, U> {
     /// Returns whether the model was verified before the run, with this noise.
     pub(super) const fn has_certificate(&self) -> bool {
         self.verified
+    }
+}
+
+impl<F: Erase, U> Erase for Noisy<F, U> {
+    type Erased = Noisy<F::Erased, U>;
+
+    /// Moves energy and entropy behind pointers. The system is not verified then.
+    fn erased(self) -> Self::Erased {
+        self.map(F::erased)
     }
 }
 

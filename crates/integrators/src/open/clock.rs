@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Real, Scalar, ScalarField, Space};
+use metriplectic_fields::{ErasedField, Real, Scalar, ScalarField, Space};
 
 /// An energy `H(t, x)` from a closure `|t, x| -> Real`; as a field of the point alone it is `H(0, x)`.
 #[derive(Clone, Copy)]
@@ -26,6 +26,9 @@ impl<M: Space, F: Fn(Real, &M::Point<Real>) -> Real> ScalarField<M> for AtTime<F
     }
 }
 
+/// A closure of the time and of a point behind a pointer.
+pub type OfTime<M, T> = Box<dyn Fn(Real, &<M as Space>::Point<Real>) -> T + Send + Sync>;
+
 /// Whether the energy of a system depends on time, and how it is evaluated there.
 pub trait Clock<M: Space, H>: Copy + Default + fmt::Debug + Send + Sync + 'static {
     /// Whether it does.
@@ -39,6 +42,14 @@ pub trait Clock<M: Space, H>: Copy + Default + fmt::Debug + Send + Sync + 'stati
 
     /// Evaluates `H(t, x)` with the derivatives that `t` and `x` carry.
     fn in_time(energy: &H, t: Real, x: &M::Point<Real>) -> Real;
+
+    /// The energy behind a pointer.
+    type Erased;
+
+    /// Moves the energy behind a pointer.
+    fn erased(energy: H) -> Self::Erased
+    where
+        H: Send + Sync + 'static;
 }
 
 /// The energy does not depend on time.
@@ -60,6 +71,15 @@ impl<M: Space, H: ScalarField<M>> Clock<M, H> for Still {
 
     fn in_time(energy: &H, _: Real, x: &M::Point<Real>) -> Real {
         energy.at_real(x)
+    }
+
+    type Erased = ErasedField<M>;
+
+    fn erased(energy: H) -> ErasedField<M>
+    where
+        H: Send + Sync + 'static,
+    {
+        ErasedField::new(energy)
     }
 }
 
@@ -88,5 +108,14 @@ impl<M: Space, F: Fn(Real, &M::Point<Real>) -> Real> Clock<M, AtTime<F>> for InT
     #[inline]
     fn in_time(AtTime(energy): &AtTime<F>, t: Real, x: &M::Point<Real>) -> Real {
         energy(t, x)
+    }
+
+    type Erased = AtTime<OfTime<M, Real>>;
+
+    fn erased(energy: AtTime<F>) -> Self::Erased
+    where
+        AtTime<F>: Send + Sync + 'static,
+    {
+        AtTime(Box::new(move |t, x| <Self as Clock<M, AtTime<F>>>::in_time(&energy, t, x)))
     }
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use metriplectic_dynamics::exchange::{Exchange, Names, Rates, rates};
 use metriplectic_dynamics::velocity::Covectors;
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{Real, Space, Vector};
+use metriplectic_dynamics::{Erase, Metriplectic, System, system::Point};
+use metriplectic_fields::{ErasedField, Real, ScalarField, Space, Vector};
 use metriplectic_manifolds::MetricError;
 
 use super::clock::Clock;
@@ -58,6 +58,22 @@ impl<Y, C, X> OpenSystem<Y, C, X> {
 
     pub(super) const fn columns(&self) -> &Arc<Columns> {
         &self.columns
+    }
+}
+
+impl<M, G, B, K, H, S, L, C, X> Erase for OpenSystem<System<M, G, B, K, H, S, L>, C, X>
+where
+    M: Space,
+    C: Clock<M, H>,
+    H: Send + Sync + 'static,
+    S: ScalarField<M> + Send + Sync + 'static,
+{
+    type Erased = OpenSystem<System<M, G, B, K, C::Erased, ErasedField<M>, L>, C, X>;
+
+    fn erased(self) -> Self::Erased {
+        let Self { closed, exchange, columns, clock, verified } = self;
+        let closed = closed.map_fields(C::erased, ErasedField::new);
+        OpenSystem { closed, exchange, columns, clock, verified }
     }
 }
 

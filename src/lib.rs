@@ -99,12 +99,12 @@ pub mod prelude {
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_integrators::{
         Adjoints, Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8,
-        Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, Inlined, ItohAbe, MeanValue,
-        Method, Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
-        OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run,
-        RunError, RungeKuttaChebyshev, Scheme, Simulation, Span, SpanError, StartError, State,
-        StepError, Stepper, Steps, SymmetricItohAbe, Systems, Tableau, Tangents, Trajectory, Until,
-        Watch,
+        Ending, Error, Event, ExplicitRungeKutta, FamilySurroundings, Gauss, Gonzalez, Inlined,
+        ItohAbe, MeanValue, Method, Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy,
+        NoisyError, Observables, OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow,
+        ResumeError, Run, RunError, RungeKuttaChebyshev, Scheme, Simulation, Span, SpanError,
+        StartError, State, StepError, Stepper, Steps, SymmetricItohAbe, Systems, Tableau, Tangents,
+        Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, NoisySurroundings, Onsager, OpenLattice,

@@ -122,6 +122,19 @@ fn members_of_families_have_one_type_the_bits_of_their_closures_and_their_tangen
         })+};
     }
     same_tangents!(DormandPrince8, WeylMidpoint);
+
+    // Those with surroundings.
+    let clocked = |scale: f64| {
+        let energy = move |t: Real, p: &Vector3<Real>, a: &Vector1<Real>| {
+            long(p) * a.x * scale + p.x * t.sin()
+        };
+        family().energy_in_time(energy).entropy(entropy)
+    };
+    let (one, two) = (clocked(1.0), clocked(2.0));
+    let (one, two) = (one.build().unwrap(), two.build().unwrap());
+    let starts = [one.at(at).start(START), one.at(at).start(START)];
+    let erased = [one.at(at).into_system().erased(), two.at(at).into_system().erased()];
+    compared(erased, (&*one.at(at), &*two.at(at)), DormandPrince8, starts);
 }
 
 /// A body that answers by itself.

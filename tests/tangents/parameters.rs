@@ -5,7 +5,8 @@ use std::fmt;
 use metriplectic::equations::{Equations, Sizes};
 use metriplectic::integrators::tangent::SmoothFlow;
 use metriplectic::integrators::{
-    Element, Entries, FromEquations, OpenState, Schedule, TangentError, Unlinearised, Vector as _,
+    Element, Entries, FromEquations, OpenState, Schedule, SystemAt, TangentError, Unlinearised,
+    Vector as _,
 };
 use metriplectic::lattices::{Onsager, SiteState};
 use metriplectic::prelude::*;
@@ -48,20 +49,40 @@ fn compared<S, B, E, M, const P: usize>(
     M: Clone + Stepper<S>,
 {
     let system = systems.at(theta).expect("a system");
+    let build = |theta: &SVector<f64, P>| systems.build(theta).expect("a system");
+    compared_by_hand(name, (system, systems.names()), (theta, build), method, (start, span));
+}
+
+/// The same, with the runs of systems that are built by hand.
+pub(crate) fn compared_by_hand<S, R, M, const P: usize>(
+    name: &str,
+    (system, names): (SystemAt<'_, S>, &[&str; P]),
+    (theta, build): (SVector<f64, P>, impl Fn(&SVector<f64, P>) -> R),
+    method: M,
+    (start, span): (impl Fn(&R) -> Element<R>, Span),
+) where
+    S: SmoothFlow,
+    R: SmoothFlow<Space = S::Space>,
+    M: Clone + Stepper<S> + Stepper<R>,
+{
     let flow: &S = &system;
-    let x0 = start(flow);
+    let by_hand = build(&theta);
+    let x0 = start(&by_hand);
     let run = method.clone().tangent(&system, x0.clone(), span).expect("a tangent");
-    let plain = method.clone().run(flow, x0.clone(), span).expect("it runs");
+    let plain = method.clone().run(&by_hand, x0.clone(), span).expect("it runs");
+    let same = method.clone().run(&system, x0.clone(), span).expect("it runs");
+    assert!(plain.states() == same.states(), "{name}: it is not the system by hand");
     assert!(plain.last().point == run.last().point, "{name}: the tangent changed the run");
+    assert!(same.certificate().keeps_energy(), "{name}: {}", same.certificate());
     let last = |theta: &SVector<f64, P>| {
-        let system = systems.build(theta).expect("a system");
+        let system = build(theta);
         let run = method.clone().run(&system, start(&system), span).expect("it runs");
         run.last().point.clone()
     };
     let expected = differences(flow, &run.last().point, &theta, 2e-5, last);
     let found = run.last().along_parameters();
     let error = off(&found, &expected);
-    for (k, name) in systems.names().iter().enumerate() {
+    for (k, name) in names.iter().enumerate() {
         assert_eq!(run.last().along(name), Some(found.column(k).into_owned()));
     }
     // The costate goes back through the same steps.
@@ -95,10 +116,11 @@ macro_rules! open_body {
             .bath("air", Bath::at(temperature).isotropic(friction))
     }};
 }
+pub(crate) use open_body;
 
-const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
-const BODY: [&str; 4] = ["inertia", "torque", "temperature", "friction"];
-const THETA: Vector4<f64> = Vector4::new(0.5, 0.4, 1.2, 0.1);
+pub(crate) const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
+pub(crate) const BODY: [&str; 4] = ["inertia", "torque", "temperature", "friction"];
+pub(crate) const THETA: Vector4<f64> = Vector4::new(0.5, 0.4, 1.2, 0.1);
 
 #[test]
 fn states_and_ledgers_of_open_systems_have_derivatives_along_parameters() {

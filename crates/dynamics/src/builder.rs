@@ -302,10 +302,27 @@ impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
         S: ScalarField<M>,
         L: Invariants<M>,
     {
+        let (system, surroundings) = self.finish()?;
+        Ok(surroundings.around(system))
+    }
+
+    /// Finishes the system without its surroundings.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub(crate) fn finish(self) -> Result<(Built<M, G, B, K, H, S, L>, P), BuildError>
+    where
+        P: Surroundings,
+        G: Riemannian<M>,
+        B: Bracket<M, G>,
+        K: Choice<Dissipation: Dissipation<M, G>>,
+        L: Invariants<M>,
+    {
         let SystemBuilder { tensors, fields, has_entropy, second_law, surroundings } =
             self.choose(K::chosen);
         let is_open = surroundings.is_open();
         let system = System::new(tensors, fields, second_law, Context { has_entropy, is_open })?;
-        Ok(surroundings.around(system))
+        Ok((system, surroundings))
     }
 }

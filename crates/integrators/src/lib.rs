@@ -96,7 +96,7 @@ pub use step::{
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,
 };
 pub use tangent::{
-    AdjointRun, Adjoints, Differentiated, Linearised as LinearisedStep, LinearisedAlong,
-    LossGradient, SelfAdjoint, Sensitivity, SystemAt, Systems, TangentError, TangentEvent,
-    TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
+    AdjointRun, Adjoints, Differentiated, FamilySurroundings, Linearised as LinearisedStep,
+    LinearisedAlong, LossGradient, SelfAdjoint, Sensitivity, SystemAt, Systems, TangentError,
+    TangentEvent, TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
 };

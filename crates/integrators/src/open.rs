@@ -47,7 +47,7 @@ mod vector;
 mod verify;
 mod view;
 
-pub use builder::{OpenBuilder, Opened, Opening};
+pub use builder::{OpenBuilder, Opened, Opening, Timed, With};
 pub use clock::{AtTime, Clock, InTime, OfTime, Still};
 pub use in_numbers::{Exchanged, OpenFlow, OpenSteps};
 pub use projection::OpenGradients;

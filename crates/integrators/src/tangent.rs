@@ -40,6 +40,7 @@ mod error;
 mod event;
 mod explicit;
 mod factors;
+mod families;
 mod frames;
 mod landing;
 mod linearised;
@@ -71,6 +72,7 @@ pub use columns::{Carried, Columns, LawRows, Moved};
 pub use differentiated::Differentiated;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
+pub use families::{BathOf, Depends, FamilySurroundings, InTimeOf, OpenFamily, SurroundingsOf};
 #[doc(hidden)]
 pub use frames::between;
 pub use linearised::{Linearised, Piece, Propagated, Targets};

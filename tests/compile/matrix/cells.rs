@@ -18,7 +18,7 @@ verb                                  | closed     | family    | open         | 
 `RungeKuttaChebyshev`                 | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `NinomiyaVictoir`                     | –          | –         | –            | promises  | promises   | –        | –            | ring          | –            | –
 a field of a struct: `Simulation`     | struct     | struct    | struct       | struct    | struct     | in lists | in lists     | in lists      | struct       | struct
-energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0599        | E0599
+energy and entropy in boxes: `erased` | erased     | members   | boxes        | boxes     | boxes      | site boxes | site boxes | noisy boxes   | own box      | own box
 
 `tangent` of `WeylMidpoint`           | schemes    | default   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 `tangent` of `DormandPrince8`         | explicit   | explicit  | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
@@ -33,9 +33,9 @@ derivatives along parameters          | a family   | a family  | its ledger   | 
 `verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 `report`                              | report     | columns   | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 
-thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | warm sites   | –             | E0277        | E0277
-an energy that depends on time        | promises   | E0599     | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
-ports and baths                       | promises   | E0599     | –            | books     | –          | promises | –            | warm sites    | E0599        | E0599
+thermal noise in its builder          | promises   | rubbed    | books        | –         | –          | ring     | warm sites   | –             | E0277        | E0277
+an energy that depends on time        | promises   | pushed    | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
+ports and baths                       | promises   | pushed    | –            | books     | –          | promises | –            | warm sites    | E0599        | E0599
 
 events                                | events     | saltation | ledger       | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
 jumps                                 | promises   | saltation | kicks        | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
@@ -94,6 +94,9 @@ const BY_DIFFERENCES: &str = "`Fit::of_systems` and `Loss::of_systems`: derivati
 const BESIDE: &str = "derivatives of a step are \
                       [differences of steps beside it](sensitivities.md#derivatives-of-any-kind-of-system)";
 
+const SITE_BOXES: &str = "the builder of a lattice takes them in boxes, `.energy(ErasedField::new(..))`; \
+                          its other closures keep their types";
+
 /// The tests that the matrix names.
 pub(crate) const TESTS: &[Reference] = &[
     right("promises", PROMISES[0], PROMISES[1]),
@@ -119,6 +122,44 @@ pub(crate) const TESTS: &[Reference] = &[
         "erased",
         "tests/compile/doors.rs",
         "erased_closures_have_one_type_and_the_bits_of_the_closures",
+    ),
+    right(
+        "members",
+        "tests/erased.rs",
+        "members_of_families_have_one_type_the_bits_of_their_closures_and_their_tangents",
+    ),
+    right(
+        "boxes",
+        "tests/erased.rs",
+        "noisy_and_open_systems_have_one_type_and_the_bits_of_their_closures",
+    ),
+    partly(
+        "site boxes",
+        ["tests/erased.rs", "lattices_have_one_type_and_the_bits_of_their_closures"],
+        SITE_BOXES,
+    ),
+    partly(
+        "noisy boxes",
+        ["tests/erased.rs", "noisy_lattices_have_one_type_and_the_bits_of_their_closures"],
+        SITE_BOXES,
+    ),
+    partly(
+        "own box",
+        ["tests/erased.rs", "systems_of_ones_own_have_one_type_and_their_bits"],
+        "the whole system is in one box",
+    ),
+    partly(
+        "rubbed",
+        ["tests/tangents/families.rs", "a_family_has_the_noise_of_its_friction"],
+        BESIDE,
+    ),
+    partly(
+        "pushed",
+        [
+            "tests/tangents/families.rs",
+            "families_with_surroundings_are_the_systems_by_hand_with_derivatives",
+        ],
+        BESIDE,
     ),
     right("schemes", "tests/tangent/schemes.rs", "tangents_of_schemes_are_those_of_differences"),
     right("default", "tests/trust/noise.rs", "a_retraction_is_its_scheme"),

@@ -105,20 +105,35 @@ const ROOM: &str = ".opened()
     .work(\"nothing\", [0], |t, _, u: &Vector1<f64>| u * 0.0)
     .bath(\"room\", 1.0, [1], |_, at: &SiteState<'_, Euclidean<1>>| [Onsager { rate: at.x.x, b: vector![1.0] }])";
 
-/// The builder of a family, with a clock instead of its energy where there is one.
-fn family(has_clock: bool) -> String {
-    let energy = if has_clock {
-        ".energy_in_time(|t: Real, p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.x * t.sin())"
-    } else {
-        ".energy(|p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.z * p.z * 1.5)"
-    };
+const OF_ENERGY: &str =
+    ".energy(|p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.z * p.z * 1.5)";
+const OF_CLOCK: &str = ".energy_in_time(|t: Real, p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.x * t.sin())";
+/// The surroundings of a family.
+const OF_ROOM: &str =
+    ".work(\"torque\", |t: Real, p: &Vector3<Real>, a: &Vector1<Real>| p * t.sin() * a.x)
+    .bath(\"air\", Bath::at(1.0).isotropic(0.1))
+    .bath(\"oil\", |a: &Vector1<f64>| Bath::at(1.0).isotropic(a.x))";
+
+/// The builder of a family with these parts.
+fn family(parts: &str) -> String {
     let entropy = ".entropy(|p: &Vector3<Real>, _: &Vector1<Real>| p.norm_squared() * 0.5)";
-    format!("Family::on(LieDual::so3()).parameters([\"a\"]){energy}{entropy}")
+    format!("Family::on(LieDual::so3()).parameters([\"a\"]){entropy}{parts}.build()?")
+}
+
+/// A statement that runs a member of a family with these parts, with its derivatives.
+fn member(parts: &str, method: &str, start: &str) -> String {
+    format!(
+        "let f = {};
+    let s = f.at(vector![1.0]);
+    let _ = {method}.run(&s, {start}, {STEPS})?;
+    let _ = {method}.tangent(&s, {start}, {STEPS})?.last().along(\"a\");",
+        family(parts)
+    )
 }
 
 /// A statement that builds a family, as `f`.
 fn with_parameters() -> String {
-    format!("let f = {}.build()?;", family(false))
+    format!("let f = {};", family(OF_ENERGY))
 }
 
 /// A statement that says how a system of this kind is built at values of parameters.
@@ -129,13 +144,25 @@ fn built(kind: Kind) -> String {
     )
 }
 
+/// A statement that builds two lattices of one type, with their surroundings or their noise.
+fn boxed_sites(around: &str) -> String {
+    format!(
+        "let on = |energy| Lattice::on(Graph::ring(4), LieDual::so3()).energy(energy);
+    let soft = on(ErasedField::new(|p: &Vector3<Real>| p.norm_squared())).build()?{around};
+    let _ = [soft, on(ErasedField::new(|p: &Vector3<Real>| p.x.exp())).build()?{around}];"
+    )
+}
+
 /// A statement that builds a system of this kind with one part more, which its kind does not have.
 fn with(kind: Kind, part: &str) -> String {
     let built =
         |parts: &str| format!("let _ = System::on(LieDual::so3()){ENTROPY}{parts}.build()?;");
     match (part, kind) {
         ("noise", Closed) => built(&format!("{ENERGY}{NOISE}")),
-        ("noise", Family) => format!("let _ = {}{NOISE}.build()?;", family(false)),
+        ("noise", Family) => {
+            let method = Noisy.method("DormandPrince8");
+            member(&format!("{OF_ENERGY}{NOISE}"), &method, "x")
+        }
         ("noise", Open) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
         ("noise", Lattice | OpenLattice) => "let _ = s.with_noise(Boltzmann(0.1));".to_owned(),
         ("noise", _) => format!(
@@ -143,13 +170,15 @@ fn with(kind: Kind, part: &str) -> String {
     let _ = RandomFlow(DormandPrince8).seed(1).run(&n, x, {STEPS})?;"
         ),
         ("clock", Closed) => built(CLOCK),
-        ("clock", Family) => format!("let _ = {}.build()?;", family(true)),
+        ("clock", Family) => member(OF_CLOCK, "DormandPrince8", "s.start(x)"),
         ("clock", Noisy) => built(&format!("{CLOCK}{NOISE}")),
         ("clock", NoisyOpen) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
         ("clock", OpenLattice) => format!("let _ = s{CLOCK};"),
         ("clock", _) => format!("let _ = s.opened(){CLOCK};"),
         ("ports", Closed) => built(&format!("{ENERGY}{PORT}{BATH}")),
-        ("ports", Family) => format!("let _ = {}{PORT}{BATH}.build()?;", family(false)),
+        ("ports", Family) => {
+            member(&format!("{OF_ENERGY}{OF_ROOM}"), "DormandPrince8", "s.start(x)")
+        }
         ("ports", Noisy) => built(&format!("{ENERGY}{PORT}{BATH}{NOISE}")),
         (_, NoisyLattice) => format!("let _ = s{ROOM};"),
         (_, _) => format!("let _ = s{SITES};"),
@@ -179,7 +208,12 @@ fn verb(kind: Kind, name: &str) -> String {
     let case = Case {{ simulation: Simulation::new({dp8}, s) }};
     let _ = case.simulation.run(&[0.4, 0.5, 0.3], {STEPS});"
         ),
-        "energy and entropy in boxes: `erased`" => "let _ = s.erased();".to_owned(),
+        "energy and entropy in boxes: `erased`" => match kind {
+            Lattice => boxed_sites(""),
+            OpenLattice => boxed_sites(".opened()"),
+            NoisyLattice => boxed_sites(".with_noise(Boltzmann(0.1))"),
+            _ => "let _ = s.erased();".to_owned(),
+        },
         "`tangent` of `WeylMidpoint`" => tangent("WeylMidpoint"),
         "`tangent` of `DormandPrince8`" => tangent("DormandPrince8"),
         "`tangent` of `Gauss`" => tangent("Gauss::<2>"),

@@ -11,13 +11,14 @@ use nalgebra::{Const, SVector};
 
 use super::{BracketOf, Family, FieldOf, ForcedOf, OfPair, OnFirst};
 use crate::bracket::{Bracket, LiePoisson, NaturalBracket, Zero};
-use crate::builder::{Built, NoEnergy, SystemBuilder};
+use crate::builder::{Built, NoEnergy, Surroundings, SystemBuilder};
 use crate::dissipation::{Choice, Dissipation, Given, MetricDissipation, NoDissipation, Scaled};
 use crate::invariants::{Casimir, Invariants, Momentum};
 use crate::metriplectic::SecondLaw;
 use crate::system::{BuildError, NoEntropy, System};
 
-/// A family in the making: as a [`SystemBuilder`], with closures of two arguments, `|x, θ|`.
+/// A family in the making: as a [`SystemBuilder`], with closures of two arguments, `|x, θ|`. The trait `FamilySurroundings` of
+/// the integrators gives it ports, baths, an energy that depends on time, and noise.
 #[must_use = "a builder does nothing until `build` is called"]
 pub struct FamilyBuilder<Y, const P: usize> {
     wide: Y,
@@ -34,9 +35,9 @@ impl<Y, const P: usize> fmt::Debug for FamilyBuilder<Y, P> {
 #[derive(Clone, Copy, Debug)]
 pub struct Unnamed<M>(M);
 
-/// A builder on `M × Rᴾ`.
-type Wide<M, G, B, K, H, S, L, const P: usize> =
-    SystemBuilder<Product<M, Euclidean<P>>, G, B, K, H, S, L>;
+/// A builder on `M × Rᴾ`, with surroundings `Q`.
+type Wide<M, G, B, K, H, S, L, const P: usize, Q = ()> =
+    SystemBuilder<Product<M, Euclidean<P>>, G, B, K, H, S, L, Q>;
 
 impl Family<(), 0> {
     /// Starts a family of systems on a manifold, with its canonical metric and its natural bracket.
@@ -72,13 +73,15 @@ impl<M: NaturalBracket> Unnamed<M> {
     }
 }
 
-impl<M, G, B, K, H, S, L, const P: usize> FamilyBuilder<Wide<M, G, B, K, H, S, L, P>, P>
+impl<M, G, B, K, H, S, L, Q, const P: usize> FamilyBuilder<Wide<M, G, B, K, H, S, L, P, Q>, P>
 where
     M: Manifold + Times<Euclidean<P>>,
 {
-    fn with<T>(
+    /// Replaces the builder on `M × Rᴾ`, on which the parts of the family are those of a system.
+    #[doc(hidden)]
+    pub fn with<T>(
         self,
-        replace: impl FnOnce(Wide<M, G, B, K, H, S, L, P>) -> T,
+        replace: impl FnOnce(Wide<M, G, B, K, H, S, L, P, Q>) -> T,
     ) -> FamilyBuilder<T, P> {
         FamilyBuilder { wide: replace(self.wide), names: self.names }
     }
@@ -88,7 +91,7 @@ where
         clippy::type_complexity,
         reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
     )]
-    pub fn energy<F>(self, energy: F) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P>, P>
+    pub fn energy<F>(self, energy: F) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
     {
@@ -103,7 +106,7 @@ where
     pub fn entropy<F>(
         self,
         entropy: F,
-    ) -> FamilyBuilder<Wide<M, G, B, K::WithEntropy, H, OfPair<F>, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, G, B, K::WithEntropy, H, OfPair<F>, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
         K: Choice,
@@ -119,7 +122,7 @@ where
     pub fn metric<F: Riemannian<M>>(
         self,
         metric: F,
-    ) -> FamilyBuilder<Wide<M, (F, Inert), B, K, H, S, L, P>, P> {
+    ) -> FamilyBuilder<Wide<M, (F, Inert), B, K, H, S, L, P, Q>, P> {
         self.with(|wide| wide.metric((metric, Inert)))
     }
 
@@ -133,7 +136,7 @@ where
     pub fn field_metric<F>(
         self,
         metric: F,
-    ) -> FamilyBuilder<Wide<M, ParametricMetric<F>, B, K, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, ParametricMetric<F>, B, K, H, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
     {
@@ -148,7 +151,7 @@ where
     pub fn field_bracket<F>(
         self,
         bracket: F,
-    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
     {
@@ -164,7 +167,7 @@ where
     pub fn almost_field_bracket<F>(
         self,
         bracket: F,
-    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
     {
@@ -180,7 +183,7 @@ where
     pub fn metric_dissipation<F>(
         self,
         kappa: F,
-    ) -> FamilyBuilder<Wide<M, G, B, Given<Scaled<OfPair<F>, MetricDissipation>>, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, G, B, Given<Scaled<OfPair<F>, MetricDissipation>>, H, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
     {
@@ -192,7 +195,10 @@ where
         clippy::type_complexity,
         reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
     )]
-    pub fn bracket<F>(self, bracket: F) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P>, P> {
+    pub fn bracket<F>(
+        self,
+        bracket: F,
+    ) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P, Q>, P> {
         self.with(|wide| wide.bracket((bracket, Zero)))
     }
 
@@ -204,7 +210,7 @@ where
     pub fn dissipation<F>(
         self,
         dissipation: F,
-    ) -> FamilyBuilder<Wide<M, G, B, Given<OnFirst<F>>, H, S, L, P>, P> {
+    ) -> FamilyBuilder<Wide<M, G, B, Given<OnFirst<F>>, H, S, L, P, Q>, P> {
         self.with(|wide| wide.dissipation(OnFirst(dissipation)))
     }
 
@@ -217,7 +223,7 @@ where
     pub fn field_dissipation<F>(
         self,
         dissipation: F,
-    ) -> FamilyBuilder<Wide<M, G, B, Given<FieldOf<F>>, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<M, G, B, Given<FieldOf<F>>, H, S, L, P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &Velocity<M, Real>, &SVector<Real, P>) -> Form<M, Real>,
     {
@@ -232,7 +238,7 @@ where
     pub fn casimir<F>(
         self,
         casimir: F,
-    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Casimir<OfPair<F>>), P>, P>
+    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Casimir<OfPair<F>>), P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
     {
@@ -247,7 +253,7 @@ where
     pub fn momentum<F>(
         self,
         momentum: F,
-    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Momentum<OfPair<F>>), P>, P>
+    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Momentum<OfPair<F>>), P, Q>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
     {
@@ -270,8 +276,9 @@ where
     )]
     pub fn build(
         self,
-    ) -> Result<Family<Built<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>, BuildError>
+    ) -> Result<Q::Built<Family<Built<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>>, BuildError>
     where
+        Q: Surroundings,
         G: Riemannian<Product<M, Euclidean<P>>>,
         B: Bracket<Product<M, Euclidean<P>>, G>,
         K: Choice<Dissipation: Dissipation<Product<M, Euclidean<P>>, G>>,
@@ -283,12 +290,13 @@ where
         if count > 0 && count >= dimension {
             return Err(BuildError::TooManyInvariants { count, dimension });
         }
-        Ok(Family::new(self.wide.build()?, self.names))
+        let (wide, surroundings) = self.wide.finish()?;
+        Ok(surroundings.around(Family::new(wide, self.names)))
     }
 }
 
-impl<G, K, H, S, L, const N: usize, const P: usize>
-    FamilyBuilder<Wide<LieDual<N>, G, (LiePoisson, Zero), K, H, S, L, P>, P>
+impl<G, K, H, S, L, Q, const N: usize, const P: usize>
+    FamilyBuilder<Wide<LieDual<N>, G, (LiePoisson, Zero), K, H, S, L, P, Q>, P>
 where
     Const<N>: Plus<Const<P>>,
     K: Choice,
@@ -302,7 +310,7 @@ where
     pub fn force<F>(
         self,
         force: F,
-    ) -> FamilyBuilder<Wide<LieDual<N>, G, ForcedOf<F>, K::WithForce, H, S, L, P>, P>
+    ) -> FamilyBuilder<Wide<LieDual<N>, G, ForcedOf<F>, K::WithForce, H, S, L, P, Q>, P>
     where
         F: Fn(&SVector<Real, N>, &SVector<Real, P>) -> SVector<Real, N>,
     {

@@ -13,6 +13,17 @@ pub struct Fluctuates<P, U> {
     noise: Noise<U>,
 }
 
+impl<P, U> Fluctuates<P, U> {
+    pub(crate) const fn new(surroundings: P, noise: Noise<U>) -> Self {
+        Self { surroundings, noise }
+    }
+
+    /// The noise in other surroundings.
+    pub(crate) fn map<Q>(self, replace: impl FnOnce(P) -> Q) -> Fluctuates<Q, U> {
+        Fluctuates { surroundings: replace(self.surroundings), noise: self.noise }
+    }
+}
+
 impl<P: Surroundings, U> Surroundings for Fluctuates<P, U> {
     type Built<Y> = Noisy<P::Built<Y>, U>;
 
@@ -30,7 +41,7 @@ type With<M, G, B, K, H, S, L, P, U> = SystemBuilder<M, G, B, K, H, S, L, Fluctu
 
 /// Gives a system the thermal noise that its friction fixes.
 pub trait NoiseBuilder<M, G, B, K, H, S, L, P>: Sized {
-    /// Sets the strength of the noise, after everything else: [`Boltzmann(k_B)`](metriplectic_dynamics::Boltzmann),
+    /// Sets the strength of the noise: [`Boltzmann(k_B)`](metriplectic_dynamics::Boltzmann),
     /// with a [measure](metriplectic_dynamics::Boltzmann::measure) or without one.
     #[allow(
         clippy::type_complexity,
@@ -44,6 +55,6 @@ impl<M, G, B, K, H, S, L, P> NoiseBuilder<M, G, B, K, H, S, L, P>
 {
     fn noise<N: Fluctuation>(self, noise: N) -> With<M, G, B, K, H, S, L, P, N::Measure> {
         let noise = Noise::of(noise);
-        self.surrounded(|surroundings| Fluctuates { surroundings, noise })
+        self.surrounded(|surroundings| Fluctuates::new(surroundings, noise))
     }
 }

@@ -10,6 +10,7 @@ use metriplectic_manifolds::Manifold;
 
 use super::clock::{AtTime, InTime, Still};
 use super::system::OpenSystem;
+use crate::noise::Fluctuates;
 
 /// The surroundings of a system in the making: a clock `C` in its energy, or [`Still`], and ports and baths `X`.
 #[derive(Clone, Debug)]
@@ -27,53 +28,81 @@ impl<C, X> Surroundings for Opened<C, X> {
     }
 }
 
-/// Surroundings that may be opened further: none yet, or [`Opened`].
+/// Surroundings that may be opened further: none yet, [`Opened`], or these with noise.
 pub trait Opening: Sized {
     /// Whether the energy depends on time.
     type Clock;
     /// The ports and baths so far.
     type Exchange;
+    /// The same surroundings with another clock, and with more ports and baths.
+    type With<C, X>;
 
-    /// The surroundings as they are opened.
-    fn opened(self) -> Opened<Self::Clock, Self::Exchange>;
+    /// Replaces the clock, the ports and the baths.
+    fn open<C, X>(
+        self,
+        replace: impl FnOnce(Opened<Self::Clock, Self::Exchange>) -> Opened<C, X>,
+    ) -> Self::With<C, X>;
 }
 
 impl Opening for () {
     type Clock = Still;
     type Exchange = ();
+    type With<C, X> = Opened<C, X>;
 
-    fn opened(self) -> Opened<Still, ()> {
-        Opened { exchange: (), names: Vec::new(), clock: PhantomData }
+    fn open<C, X>(self, replace: impl FnOnce(Opened<Still, ()>) -> Opened<C, X>) -> Opened<C, X> {
+        replace(Opened { exchange: (), names: Vec::new(), clock: PhantomData })
     }
 }
 
-impl<C, X> Opening for Opened<C, X> {
-    type Clock = C;
-    type Exchange = X;
+impl<D, Z> Opening for Opened<D, Z> {
+    type Clock = D;
+    type Exchange = Z;
+    type With<C, X> = Opened<C, X>;
 
-    fn opened(self) -> Self {
-        self
+    fn open<C, X>(self, replace: impl FnOnce(Self) -> Opened<C, X>) -> Opened<C, X> {
+        replace(self)
+    }
+}
+
+impl<P: Opening, U> Opening for Fluctuates<P, U> {
+    type Clock = P::Clock;
+    type Exchange = P::Exchange;
+    type With<C, X> = Fluctuates<P::With<C, X>, U>;
+
+    fn open<C, X>(
+        self,
+        replace: impl FnOnce(Opened<P::Clock, P::Exchange>) -> Opened<C, X>,
+    ) -> Self::With<C, X> {
+        self.map(|surroundings| surroundings.open(replace))
     }
 }
 
 impl<C, X> Opened<C, X> {
+    /// The surroundings with an energy that depends on time.
+    pub(crate) fn in_time(self) -> Opened<InTime, X> {
+        Opened { exchange: self.exchange, names: self.names, clock: PhantomData }
+    }
+
+    /// The surroundings with one more port.
+    pub(crate) fn work<F>(self, name: &Arc<str>, velocity: F) -> Opened<C, (X, Port<F>)> {
+        self.with(name, Port::new(Arc::clone(name), velocity), false)
+    }
+
+    /// The surroundings with one more bath.
+    pub(crate) fn bath<B>(self, name: &Arc<str>, bath: B) -> Opened<C, (X, Named<B>)> {
+        self.with(name, Named::new(Arc::clone(name), bath), true)
+    }
+
     fn with<T>(mut self, name: &Arc<str>, part: T, is_bath: bool) -> Opened<C, (X, T)> {
         self.names.push((Arc::clone(name), is_bath));
         Opened { exchange: (self.exchange, part), names: self.names, clock: PhantomData }
     }
 }
 
-/// A builder with one more part of its surroundings.
-type With<M, G, B, K, H, S, L, P, T> = SystemBuilder<
-    M,
-    G,
-    B,
-    K,
-    H,
-    S,
-    L,
-    Opened<<P as Opening>::Clock, (<P as Opening>::Exchange, T)>,
->;
+/// Surroundings with one more part.
+pub type With<P, T> = <P as Opening>::With<<P as Opening>::Clock, (<P as Opening>::Exchange, T)>;
+/// Surroundings with a clock.
+pub type Timed<P> = <P as Opening>::With<InTime, <P as Opening>::Exchange>;
 
 /// Opens a system: its energy may depend on time, ports do work on it, and baths give heat to it.
 ///
@@ -113,10 +142,7 @@ type With<M, G, B, K, H, S, L, P, T> = SystemBuilder<
 )]
 pub trait OpenBuilder<M: Manifold, G, B, K, H, S, L, P: Opening>: Sized {
     /// Sets an energy `H(t, x)` that depends on time, from a closure `|t, x| -> Real`.
-    fn energy_in_time<F>(
-        self,
-        energy: F,
-    ) -> SystemBuilder<M, G, B, K, AtTime<F>, S, L, Opened<InTime, P::Exchange>>
+    fn energy_in_time<F>(self, energy: F) -> SystemBuilder<M, G, B, K, AtTime<F>, S, L, Timed<P>>
     where
         F: Fn(Real, &M::Point<Real>) -> Real;
 
@@ -126,7 +152,7 @@ pub trait OpenBuilder<M: Manifold, G, B, K, H, S, L, P: Opening>: Sized {
         self,
         name: impl Into<Arc<str>>,
         velocity: F,
-    ) -> With<M, G, B, K, H, S, L, P, Port<F>>
+    ) -> SystemBuilder<M, G, B, K, H, S, L, With<P, Port<F>>>
     where
         F: Fn(Real, &M::Point<Real>) -> Velocity<M, Real>;
 
@@ -135,48 +161,37 @@ pub trait OpenBuilder<M: Manifold, G, B, K, H, S, L, P: Opening>: Sized {
         self,
         name: impl Into<Arc<str>>,
         bath: Bath<T, R>,
-    ) -> With<M, G, B, K, H, S, L, P, Named<Bath<T, R>>>;
+    ) -> SystemBuilder<M, G, B, K, H, S, L, With<P, Named<Bath<T, R>>>>;
 }
 
 impl<M: Manifold, G, B, K, H, S, L, P: Opening> OpenBuilder<M, G, B, K, H, S, L, P>
     for SystemBuilder<M, G, B, K, H, S, L, P>
 {
-    fn energy_in_time<F>(
-        self,
-        energy: F,
-    ) -> SystemBuilder<M, G, B, K, AtTime<F>, S, L, Opened<InTime, P::Exchange>>
+    fn energy_in_time<F>(self, energy: F) -> SystemBuilder<M, G, B, K, AtTime<F>, S, L, Timed<P>>
     where
         F: Fn(Real, &M::Point<Real>) -> Real,
     {
-        self.energy(AtTime(energy)).surrounded(|surroundings| {
-            let Opened { exchange, names, .. } = surroundings.opened();
-            Opened { exchange, names, clock: PhantomData }
-        })
+        self.energy(AtTime(energy)).surrounded(|surroundings| surroundings.open(Opened::in_time))
     }
 
     fn work<F>(
         self,
         name: impl Into<Arc<str>>,
         velocity: F,
-    ) -> With<M, G, B, K, H, S, L, P, Port<F>>
+    ) -> SystemBuilder<M, G, B, K, H, S, L, With<P, Port<F>>>
     where
         F: Fn(Real, &M::Point<Real>) -> Velocity<M, Real>,
     {
         let name = name.into();
-        self.surrounded(|surroundings| {
-            let port = Port::new(Arc::clone(&name), velocity);
-            surroundings.opened().with(&name, port, false)
-        })
+        self.surrounded(|surroundings| surroundings.open(|opened| opened.work(&name, velocity)))
     }
 
     fn bath<T, R>(
         self,
         name: impl Into<Arc<str>>,
         bath: Bath<T, R>,
-    ) -> With<M, G, B, K, H, S, L, P, Named<Bath<T, R>>> {
+    ) -> SystemBuilder<M, G, B, K, H, S, L, With<P, Named<Bath<T, R>>>> {
         let name = name.into();
-        self.surrounded(|surroundings| {
-            surroundings.opened().with(&name, Named::new(Arc::clone(&name), bath), true)
-        })
+        self.surrounded(|surroundings| surroundings.open(|opened| opened.bath(&name, bath)))
     }
 }

@@ -90,12 +90,7 @@ impl<B, const P: usize> Systems<B, P> {
         B: Fn(&SVector<f64, P>) -> Result<S, E>,
     {
         let system = (self.build)(&theta)?;
-        let beside = move |by: &[f64]| {
-            let displaced = theta + SVector::from_column_slice(by);
-            (self.build)(&displaced).map_err(drop)
-        };
-        let values = theta.as_slice().to_vec();
-        Ok(SystemAt { system, names: &self.names, values, beside: Box::new(beside) })
+        Ok(SystemAt::new(&self.names, theta, system, |theta| (self.build)(theta).map_err(drop)))
     }
 }
 
@@ -108,6 +103,24 @@ pub struct SystemAt<'a, S> {
     names: &'a [&'static str],
     values: Vec<f64>,
     beside: SystemBeside<'a, S>,
+}
+
+impl<'a, S> SystemAt<'a, S> {
+    /// The system at these parameters, with the closure that builds those beside it.
+    pub(super) fn new<const P: usize>(
+        names: &'a [&'static str; P],
+        theta: SVector<f64, P>,
+        system: S,
+        build: impl Fn(&SVector<f64, P>) -> Result<S, ()> + 'a,
+    ) -> Self {
+        let beside = move |by: &[f64]| build(&(theta + SVector::from_column_slice(by)));
+        Self { system, names, values: theta.as_slice().to_vec(), beside: Box::new(beside) }
+    }
+
+    /// Returns the system without its parameters.
+    pub fn into_system(self) -> S {
+        self.system
+    }
 }
 
 impl<S> Deref for SystemAt<'_, S> {

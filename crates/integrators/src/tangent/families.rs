@@ -18,9 +18,12 @@ use super::systems::SystemAt;
 use crate::noise::{Fluctuates, Noise};
 use crate::open::{AtTime, OfTime, Opening, Timed, With};
 
+/// A function of the parameters.
+type OfParameters<Q, const P: usize> = dyn Fn(&SVector<f64, P>) -> Q + Send + Sync;
+
 /// Surroundings `Q` of a family, as a function of its parameters.
 pub struct SurroundingsOf<Q, const P: usize> {
-    at: Arc<dyn Fn(&SVector<f64, P>) -> Q + Send + Sync>,
+    at: Arc<OfParameters<Q, P>>,
     is_open: bool,
 }
 

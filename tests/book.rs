@@ -52,17 +52,5 @@ struct Units;
 #[doc = include_str!("../book/src/guarantees.md")]
 struct Guarantees;
 
-#[doc = include_str!("../book/src/operations.md")]
-struct Operations;
-
 #[doc = include_str!("../book/src/performance.md")]
 struct Performance;
-
-#[doc = include_str!("../book/src/errata.md")]
-struct Errata;
-
-#[doc = include_str!("../book/src/other_libraries.md")]
-struct OtherLibraries;
-
-#[doc = include_str!("../book/src/from_0_1.md")]
-struct From01;

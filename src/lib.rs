@@ -45,6 +45,7 @@
 //!
 //! - [choose](guide::choosing) bracket, dissipation and scheme;
 //! - write [your own metric](guide::your_own_metric), or [your own manifold](guide::your_own_manifold) in sixty lines;
+//! - prove the laws and orders of [methods with stages](guide::stages);
 //! - read the paper [equation by equation](guide::equations), with its [errata](guide::errata).
 //!
 //! # The vocabulary

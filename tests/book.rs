@@ -34,12 +34,6 @@ struct Noise;
 #[doc = include_str!("../book/src/sweeps.md")]
 struct Sweeps;
 
-#[doc = include_str!("../book/src/schemes.md")]
-struct Schemes;
-
-#[doc = include_str!("../book/src/stages.md")]
-struct Stages;
-
 #[doc = include_str!("../book/src/recipes.md")]
 struct Recipes;
 

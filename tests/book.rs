@@ -40,6 +40,9 @@ struct Recipes;
 #[doc = include_str!("../book/src/verification.md")]
 struct Verification;
 
+#[doc = include_str!("../book/src/output.md")]
+struct Output;
+
 #[doc = include_str!("../book/src/units.md")]
 struct Units;
 

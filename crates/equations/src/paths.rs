@@ -130,7 +130,7 @@ pub trait Paths {
     fn turned(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
         let n = q.len();
         with_numbers(n, |axis| {
-            for (k, column) in columns.chunks_exact_mut(n).enumerate() {
+            for (k, column) in columns.chunks_exact_mut(n.max(1)).enumerate() {
                 axis.fill(0.0);
                 axis[k] = 1.0;
                 self.velocity_at(y, x, q, axis, column);
@@ -163,20 +163,30 @@ pub struct ByCharts<'a>(pub &'a dyn Model);
 /// A factor of four fails `paths.rs::charts_have_the_paths_of_their_space`.
 const LENGTH: f64 = 1e-3;
 
+/// How far an entry of a midpoint may be, relative to its way, from where the chart at the start sees it; another such fraction of
+/// the largest entry is round-off. A way around the space is off by as much as the way.
+/// A factor of four is nowhere near either.
+const SEEN: f64 = 1e-6;
+
 impl ByCharts<'_> {
-    /// The fraction of a vector that changes no entry by more than [`LENGTH`] of its size at `x`.
-    fn step(&self, x: &[f64], v: &[f64]) -> f64 {
+    /// The fraction of a vector that changes no entry by more than [`LENGTH`] of its size at `x`, or of the way from there. An entry
+    /// that is near zero has the size of the way.
+    fn step(&self, x: &[f64], ways: [&[f64]; 2], v: &[f64]) -> f64 {
         with_numbers(v.len(), |sizes| {
             self.0.scales(x, sizes);
-            let most = |(size, v): (&f64, &f64)| if *size > 0.0 { (v / size).abs() } else { 0.0 };
-            let most = sizes.iter().zip(v).map(most).fold(0.0, f64::max);
+            let mut most = 0.0_f64;
+            for (i, size) in sizes.iter().enumerate() {
+                let size = ways.iter().map(|way| way[i].abs()).fold(*size, f64::max);
+                if size > 0.0 {
+                    most = most.max((v[i] / size).abs());
+                }
+            }
             if most > 0.0 && most.is_finite() { LENGTH / most } else { LENGTH }
         })
     }
 
-    /// The derivative at zero of a function of the fraction of a vector.
-    fn derivative(&self, x: &[f64], v: &[f64], f: impl Fn(f64, &mut [f64]), to: &mut [f64]) {
-        let h = self.step(x, v);
+    /// The derivative at zero of a function of the fraction of a vector, by a difference of this length.
+    fn derivative(&self, h: f64, f: impl Fn(f64, &mut [f64]), to: &mut [f64]) {
         to.fill(0.0);
         with_numbers(to.len(), |value| {
             for (fraction, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
@@ -187,23 +197,47 @@ impl ByCharts<'_> {
         to.iter_mut().for_each(|to| *to /= 12.0 * h);
     }
 
+    /// Refuses a way whose middle `z` the chart at the start does not see in the middle: it leads beyond the chart.
+    fn reached(&self, x: &[f64], half: &[f64], z: &[f64]) -> Result<(), MetricError> {
+        if self.0.is_vector_space() {
+            return Ok(());
+        }
+        with_numbers(2 * half.len(), |room| {
+            let (seen, sizes) = room.split_at_mut(half.len());
+            let is_near = self.0.coordinates(x, z, seen);
+            self.0.scales(x, sizes);
+            let largest =
+                [&*sizes, half, x].concat().iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            let in_the_middle = seen.iter().zip(half).all(|(seen, half)| {
+                (seen - half).abs() <= SEEN * (seen.abs().max(half.abs()) + SEEN * largest)
+            });
+            if is_near && in_the_middle {
+                return Ok(());
+            }
+            let distance = 2.0 * half.iter().map(|half| half * half).sum::<f64>().sqrt();
+            Err(MetricError::OutOfChart { distance })
+        })
+    }
+
     /// `φ_y⁻¹(φ_x(q + sv))`.
     fn seen_from(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], s: f64, to: &mut [f64]) {
         let n = q.len();
         with_numbers(n + x.len(), |room| {
             let (at, point) = room.split_at_mut(n);
-            (0..n).for_each(|i| at[i] = q[i] + s * v[i]);
+            at.copy_from_slice(q);
+            at.iter_mut().zip(v).for_each(|(at, v)| *at += s * v);
             self.0.chart(x, at, point);
             let _ = self.0.coordinates(y, point, to);
         });
     }
 
-    /// A derivative of [`velocity_at`](Paths::velocity_at), along a change `p` of `q` and a change `r` of `v`.
+    /// A derivative of [`velocity_at`](Paths::velocity_at), along a change `p` of `q` and a change `r` of `v`, with the whole way.
     fn bend(
         &self,
         y: &[f64],
         (x, q, v): (&[f64], &[f64], &[f64]),
         [p, r]: [&[f64]; 2],
+        way: &[f64],
         to: &mut [f64],
     ) {
         let n = q.len();
@@ -217,7 +251,7 @@ impl ByCharts<'_> {
                 self.velocity_at(y, x, at, turned, to);
             });
         };
-        self.derivative(x, p, along, to);
+        self.derivative(self.step(x, [q, way], p), along, to);
     }
 }
 
@@ -237,8 +271,10 @@ impl Paths for ByCharts<'_> {
         with_numbers(u.len(), |half| {
             half.iter_mut().zip(u).for_each(|(half, u)| *half = 0.5 * u);
             self.0.chart(x, half, to.z);
+            self.reached(x, half, to.z)?;
             self.velocity_at(to.z, x, half, u, to.d);
-        });
+            Ok::<(), MetricError>(())
+        })?;
         self.0.chart(x, u, to.end);
         finite(to.d)
     }
@@ -264,7 +300,7 @@ impl Paths for ByCharts<'_> {
                 self.velocity_at(to.z, x, half, axis, middle);
                 with_numbers(n, |one| {
                     one[k] = 1.0;
-                    self.bend(to.z, (x, half, u), [axis, one], turned);
+                    self.bend(to.z, (x, half, u), [axis, one], u, turned);
                     self.velocity_at(to.end, x, u, one, end);
                 });
                 for i in 0..n {
@@ -290,16 +326,23 @@ impl Paths for ByCharts<'_> {
             q.iter_mut().zip(u).for_each(|(q, u)| *q = t * u);
             self.0.chart(x, q, y);
             self.velocity_at(y, x, q, u, v);
-            self.bend(y, (x, q, u), [u, nothing], a);
+            self.bend(y, (x, q, u), [u, nothing], u, a);
         });
         finite(v)
     }
 
     fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
-        if self.0.is_vector_space() {
+        let stays = || q.iter().all(|q| *q == 0.0) && x == y;
+        if self.0.is_vector_space() || stays() {
             return to.copy_from_slice(v);
         }
-        self.derivative(x, v, |s, to| self.seen_from(y, x, q, v, s, to), to);
+        // The way from `y`.
+        let nothing = [0.0; 0];
+        with_numbers(q.len(), |back| {
+            self.seen_from(y, x, q, &nothing, 0.0, back);
+            let h = self.step(x, [q, back], v);
+            self.derivative(h, |s, to| self.seen_from(y, x, q, v, s, to), to);
+        });
     }
 }
 
@@ -310,6 +353,12 @@ mod tests {
 
     /// Angles, in charts `φ_x(q) = x + 2 atan(q/2)`.
     struct Angle;
+
+    impl Angle {
+        fn turned(x: f64, q: f64) -> f64 {
+            x + 2.0 * (0.5 * q).atan()
+        }
+    }
 
     impl Equations for Angle {
         fn sizes(&self) -> Sizes {
@@ -335,7 +384,7 @@ mod tests {
         }
 
         fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
-            y[0] = x[0] + 2.0 * (0.5 * q[0]).atan();
+            y[0] = Self::turned(x[0], q[0]);
         }
 
         fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
@@ -374,5 +423,74 @@ mod tests {
         }
         assert!(worst < 4e-13, "{worst:.1e}");
         assert!(!paths.follows(Path::Weyl));
+    }
+
+    /// Angles in charts `φ_x(q) = x + q`, of which one sees another within half a turn, and an entry beside that is near zero.
+    struct Turns;
+
+    impl Equations for Turns {
+        fn sizes(&self) -> Sizes {
+            Sizes { entries: 2, directions: 2, laws: 2 }
+        }
+
+        fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+            values.copy_from_slice(&[x[0], 0.0]);
+        }
+
+        fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+            self.values(t, x, values);
+            w.copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
+        }
+
+        fn velocity(&self, _: f64, _: &[f64], v: &mut [f64]) -> Option<f64> {
+            v.fill(0.0);
+            Some(0.0)
+        }
+
+        fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+            sizes.copy_from_slice(&[1.0, x[1].abs()]);
+        }
+
+        fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+            y[0] = Angle::turned(x[0], q[0]);
+            y[1] = x[1] + q[1];
+        }
+
+        fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
+            let turn = std::f64::consts::TAU;
+            let way = y[0] - x[0];
+            q[0] = 2.0 * (0.5 * (way - turn * (way / turn).round())).tan();
+            q[1] = y[1] - x[1];
+            true
+        }
+    }
+
+    impl Apart for Turns {
+        fn is_zero(&self, _: Part) -> bool {
+            true
+        }
+
+        fn apply(&self, _: Part, _: f64, _: &[f64], _: Covectors<'_>, _: &[f64], v: &mut [f64]) {
+            v.fill(0.0);
+        }
+
+        fn has_charts(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_displacement_keeps_its_digits_where_an_entry_passes_zero() {
+        let model = Differences(Turns);
+        let paths = ByCharts(&model);
+        for small in [0.2, 1e-4, 1e-9, -1e-12, 1e-16, 1e-300, 0.0] {
+            let (x, u) = ([0.4, small], [0.7, 0.01]);
+            let [mut z, mut d, mut end] = [[0.0; 2]; 3];
+            let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+            paths.path(Path::Chart, &x, &u, to).unwrap();
+            let exact = u[0] / (1.0 + u[0] * u[0] / 16.0);
+            assert!((d[0] - exact).abs() < 4e-13 && (d[1] - u[1]).abs() < 4e-15, "{small}: {d:?}");
+            crate::laws::paths(&model, &paths, Path::Chart, &x, &u).unwrap();
+        }
     }
 }

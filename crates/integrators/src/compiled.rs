@@ -34,9 +34,9 @@ pub(crate) fn with_method<T>(
         return Some(explicit_lengths!(of_lengths));
     }
     macro_rules! of_length {
-        ($(($n:literal, $e:literal))*) => {
-            match (directions, entries) {
-                $(($n, $e) => Some(implicit(method, &OfLength::<$n, $e>::new(flow), f)?),)*
+        ($($n:literal)*) => {
+            match directions {
+                $($n => Some(implicit(method, &OfLength::<$n, $n>::new(flow), f)?),)*
                 _ => None,
             }
         };

@@ -230,15 +230,10 @@ impl<Y: Metriplectic> Written for Y {
     const HAS_EXPLICIT: bool =
         Y::Invariants::COUNT == 0 && has_explicit(<Dim<Y> as Dimension>::LEN, Y::Manifold::ENTRIES);
 
-    const HAS_IMPLICIT: bool = {
-        let (directions, entries) = (<Dim<Y> as Dimension>::LEN, Y::Manifold::ENTRIES);
-        let is_flat = Y::Manifold::IS_VECTOR_SPACE && Y::Metric::IS_CANONICAL;
-        // Instances with as many entries as directions are those of vector spaces.
-        let is_curved = !Y::Manifold::IS_VECTOR_SPACE && directions != entries;
-        Y::Invariants::COUNT == 0
-            && (is_flat && has_implicit(directions, directions)
-                || is_curved && has_implicit(directions, entries))
-    };
+    const HAS_IMPLICIT: bool = Y::Manifold::IS_VECTOR_SPACE
+        && Y::Metric::IS_CANONICAL
+        && Y::Invariants::COUNT == 0
+        && has_implicit(<Dim<Y> as Dimension>::LEN);
 
     #[inline]
     fn vector(directions: &Directions) -> Tangent<Y> {

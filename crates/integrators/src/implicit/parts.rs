@@ -360,10 +360,10 @@ impl<'a, L: Lengths> Parts<'a, L> {
         if let Some(paths) = self.paths() {
             let n = self.n();
             with_numbers(n * vectors.len(), |all| {
-                let pairs = all.chunks_exact_mut(n).zip(&*vectors);
+                let pairs = all.chunks_exact_mut(n.max(1)).zip(&*vectors);
                 pairs.for_each(|(to, v)| to.copy_from_slice(v.numbers()));
                 paths.transport(x.numbers(), y.numbers(), all);
-                let pairs = all.chunks_exact(n).zip(vectors);
+                let pairs = all.chunks_exact(n.max(1)).zip(vectors);
                 pairs.for_each(|(v, to)| to.numbers_mut().copy_from_slice(v));
             });
         }

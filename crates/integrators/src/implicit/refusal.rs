@@ -18,6 +18,16 @@ pub enum NoImplicitSteps {
         "the geodesics of this system are not known, only its charts: take `ChartMidpoint`, or answer `Model::paths`"
     )]
     Geodesics,
+    /// A vector space has another number of entries than of directions.
+    #[error(
+        "a state of this system has {entries} entries and {directions} directions: answer `Apart::has_charts` and the charts of `Equations`"
+    )]
+    Charts {
+        /// How many entries a state has.
+        entries: usize,
+        /// How many directions there are.
+        directions: usize,
+    },
     /// The retraction or the discrete gradient is not one of this library.
     #[error(
         "a system in plain numbers is stepped by the retractions and the discrete gradients of this library alone"
@@ -41,10 +51,12 @@ const MOST: usize = 1024;
 /// Refuses a system without implicit steps along the paths of a retraction.
 pub(crate) fn refuse(system: &dyn Equations, path: Path) -> Result<(), NoImplicitSteps> {
     let Some(model) = system.model() else { return Err(NoImplicitSteps::Model) };
-    let Sizes { directions: variables, .. } = system.sizes();
+    let Sizes { directions: variables, entries, .. } = system.sizes();
     let by_charts = || ByCharts(model).follows(path);
     let follows = || model.paths().map_or_else(by_charts, |paths| paths.follows(path));
-    if !is_flat(model) && !follows() {
+    if model.is_vector_space() && entries != variables {
+        Err(NoImplicitSteps::Charts { entries, directions: variables })
+    } else if !is_flat(model) && !follows() {
         Err(NoImplicitSteps::Geodesics)
     } else if variables > MOST {
         Err(NoImplicitSteps::Variables { variables })

@@ -9,7 +9,7 @@
 //! ```
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::{Equations, Model, Path};
+use metriplectic_equations::{Equations, Model, Path, Sizes};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 use super::balance::balanced;
@@ -247,19 +247,18 @@ fn open_step<M: DrivenMethod, F: OpenFlow>(
 /// The entries that are booked at a state in a unit of time.
 fn rates<F: OpenFlow>(flow: &F, at: &Element<F>) -> Option<Vec<f64>> {
     let x = flow.entries(&at.x);
-    let n = x.as_ref().len();
-    let w = flow.with_equations(|equations| {
-        let laws = equations.sizes().laws;
+    let (n, w) = flow.with_equations(|equations| {
+        let Sizes { laws, directions: n, .. } = equations.sizes();
         let (mut values, mut w) = (vec![0.0; laws], vec![0.0; laws * n]);
         equations.differentials(at.time, x.as_ref(), &mut values, &mut w);
-        w
+        (n, w)
     });
     Some(flow.exchanged(at.time, &x, [&w[..n], &w[n..2 * n]])?.entries)
 }
 
 /// The errors of the entries of a ledger.
-fn ledger_errors<F: OpenFlow>(flow: &F, at: &Element<F>, errors: &[f64]) -> Option<LedgerErrors> {
-    let nothing = Directions::zeros(flow.entries(&at.x).as_ref().len());
+fn ledger_errors<F: OpenFlow>(flow: &F, errors: &[f64]) -> Option<LedgerErrors> {
+    let nothing = Directions::zeros(flow.with_equations(|equations| equations.sizes().directions));
     flow.ledger_errors(&flow.direction(&nothing, errors))
 }
 
@@ -273,7 +272,7 @@ fn against_trapezoid<F: OpenFlow>(
     let booked = end.ledger.entries_since(&x.ledger);
     let rule = first.iter().zip(&last).map(|(first, last)| 0.5 * h * (first + last));
     let errors: Vec<f64> = booked.iter().zip(rule).map(|(sum, rule)| (sum - rule) / 3.0).collect();
-    ledger_errors(flow, x, &errors)
+    ledger_errors(flow, &errors)
 }
 
 impl<R, W> OpenSteps for Scheme<R, W>
@@ -378,7 +377,7 @@ fn errors_of_stages<F: OpenFlow>(
         if defect < size { size * (defect / size).powf(power) } else { defect }
     };
     let errors: Vec<f64> = (0..first.len()).map(error).collect();
-    ledger_errors(flow, ends[0], &errors)
+    ledger_errors(flow, &errors)
 }
 
 /// A step with stages, with the errors of its entries.

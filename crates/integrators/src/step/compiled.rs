@@ -68,11 +68,10 @@ macro_rules! explicit_lengths {
 }
 pub(crate) use explicit_lengths;
 
-/// Calls a macro with the directions and the entries with which implicit methods are compiled with the library: as many of both on a vector
-/// space.
+/// Calls a macro with the numbers of variables with which implicit methods are compiled with the library.
 macro_rules! implicit_lengths {
     ($with:ident) => {
-        $with!((1, 1)(2, 2)(3, 3)(4, 4)(2, 3)(3, 4)(3, 9))
+        $with!(1 2 3 4)
     };
 }
 pub(crate) use implicit_lengths;
@@ -87,11 +86,11 @@ pub(crate) const fn has_explicit(directions: usize, entries: usize) -> bool {
     explicit_lengths!(is_one_of)
 }
 
-/// Returns whether implicit methods of so many directions and entries are compiled with the library.
-pub(crate) const fn has_implicit(directions: usize, entries: usize) -> bool {
+/// Returns whether implicit methods of so many variables are compiled with the library.
+pub(crate) const fn has_implicit(variables: usize) -> bool {
     macro_rules! is_one_of {
-        ($(($n:literal, $e:literal))*) => {
-            false $(|| directions == $n && entries == $e)*
+        ($($n:literal)*) => {
+            false $(|| variables == $n)*
         };
     }
     implicit_lengths!(is_one_of)

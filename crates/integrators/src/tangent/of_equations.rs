@@ -172,10 +172,13 @@ impl<S: Equations> FromEquations<S> {
     /// How the steps of a method are differentiated; `None` for other steps beside them.
     fn exactly(&self, method: Option<Compiled>) -> Option<Exactly<'_>> {
         let method = method.filter(|_| self.0.is_vector_space())?;
-        let model = self.0.model().filter(|model| is_flat(*model));
+        let known = self.0.model();
+        let model = known.filter(|model| is_flat(*model));
+        // Friction is kept off further invariants in the metric.
+        let is_plain = known.is_none() || model.is_some() || self.0.sizes().laws == 2;
         let stages = |method: Option<Collocation>| Some(Exactly::Stages(model?, method?.tableau));
         match method {
-            Compiled::Explicit(_) => explicit(method).map(Exactly::Explicit),
+            Compiled::Explicit(_) => explicit(method).filter(|_| is_plain).map(Exactly::Explicit),
             Compiled::Midpoint { line, .. } if is_self_adjoint(line) => {
                 Some(Exactly::Midpoint(model?, line))
             }

@@ -124,6 +124,12 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         StepChart::of(self.parts, self.x, self.displacement(k))
     }
 
+    /// Returns whether the chart of the step reaches its end. A root beyond belongs to another way between the ends.
+    pub(super) fn is_on_its_way(&self, k: &Unknowns<L>, end: &L::State) -> bool {
+        let reaches = |chart: StepChart<L>| self.parts.is_near(&chart.z, end);
+        self.parts.is_flat() || self.chart(k).is_some_and(reaches)
+    }
+
     /// The polynomial of the step.
     #[inline]
     fn polynomial<'b>(&self, chart: &'b StepChart<L>, k: &Unknowns<L>) -> StepPolynomial<'b, L>

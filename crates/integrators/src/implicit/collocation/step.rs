@@ -100,10 +100,7 @@ impl Collocation {
             memory.last = Some(LastStep { k, filter });
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
-        // A root beyond the chart belongs to another way between the ends.
-        if !parts.is_flat()
-            && !equation.chart(&k).is_some_and(|chart| parts.is_near(&chart.z, &at.end))
-        {
+        if !equation.is_on_its_way(&k, &at.end) {
             return Err(failed(Cause::Unsolved));
         }
         if around.is_outside(&at.end) {

@@ -77,7 +77,8 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         let Solved { k, linear, evaluations, .. } = solved;
         let u = equation.displacement(&k);
         let filter = linear.filter().clone();
-        memory.linear = linear.kept(evaluations);
+        // Elsewhere the frame in which they are formed turns.
+        memory.linear = linear.kept(evaluations).filter(|_| parts.is_flat());
         memory.note(tableau, (parts, x, h), &k);
         memory.last = Some(LastStep { k, filter });
         if let Some(moved) = memory.compensation.add(parts, Path::Chart, [x, &solution.end], &u) {
@@ -145,8 +146,14 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         effort: Effort,
     ) -> Result<StageSolution<L>, StepFailure> {
         let tableau = self.method.tableau;
-        let listed = self.listed(equation, k);
-        let (stages, left) = listed.ok_or(StepFailure { cause: Cause::Edge, effort })?;
+        let failed = |cause| StepFailure { cause, effort };
+        if !equation.is_on_its_way(k, &at.end) {
+            return Err(failed(Cause::Unsolved));
+        }
+        if self.start.parts.is_outside(&at.end) {
+            return Err(failed(Cause::Edge));
+        }
+        let (stages, left) = self.listed(equation, k).ok_or(failed(Cause::Edge))?;
         let evidence = Evidence {
             entropy_slope: at.entropy_slope,
             dissipates: at.growth != 0.0,

@@ -27,6 +27,7 @@ use super::super::factors::Refined;
 use super::units::{differential, relative, reproduced, units};
 use super::{Derivative, StepOfModel};
 use crate::collocation::Tableau;
+use crate::implicit::is_flat;
 
 /// A step linearised at its root, in units of the entries.
 struct AtRoot {
@@ -44,6 +45,9 @@ struct AtRoot {
 
 impl AtRoot {
     fn of(step: &StepOfModel<'_>, tableau: &'static Tableau) -> Result<Self, Unlinearised> {
+        if !is_flat(step.model) {
+            return Err(Unlinearised::Singular);
+        }
         let around = Around::new(step, tableau).ok_or(Unlinearised::Singular)?;
         reproduced(step, around.end())?;
         let (units, n) = (units(step), around.n());

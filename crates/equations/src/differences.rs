@@ -163,6 +163,14 @@ impl<S: Apart> Equations for Differences<S> {
         self.0.kind(invariant)
     }
 
+    fn energy_depends_on_time(&self) -> bool {
+        self.0.energy_depends_on_time()
+    }
+
+    fn power(&self, t: f64, x: &[f64]) -> f64 {
+        self.0.power(t, x)
+    }
+
     fn check(&self, x: &[f64]) -> Result<(), PointError> {
         self.0.check(x)
     }

@@ -23,14 +23,14 @@ pub struct Sizes {
 ///
 /// The slices have the lengths of [`sizes`](Self::sizes): `x` and `y` that of `entries`; `q`, `v` and sizes that of
 /// `directions`, in the frame of the chart at `x`; values that of `laws`; rows of covectors `laws × directions`. Times
-/// `t` are those of the clock, which most systems do not look at. A slice that is filled keeps nothing of what it held.
+/// `t` are those of the clock, which most systems do not look at: a closed run asks at the time 0, and an open one at that of the state. A slice that is filled keeps nothing of what it held.
 ///
 /// Four questions have no default. The others have that of a closed system on a flat space.
 ///
 /// Laws ([`laws::equations`](crate::laws::equations)): 1. the differentials are those of the values; 2. `⟨dH, x'⟩ = 0` and
 /// `⟨dL_a, x'⟩ = 0`; 3. the production is not negative, and `⟨dS, x'⟩` of an exact second law; 4. `φ_x(0) = x`, and the coordinates are the
 /// inverse of the chart; 5. `ψ_x(0) = x`, and the rates there are the velocity; 6. in a [vector space](Self::is_vector_space) both charts
-/// are translations.
+/// are translations; 7. the [power](Self::power) is the rate of the energy at a frozen state.
 pub trait Equations {
     /// Returns the lengths of all slices. They do not change.
     fn sizes(&self) -> Sizes;
@@ -54,6 +54,18 @@ pub trait Equations {
     fn kind(&self, invariant: usize) -> Kind {
         let _ = invariant;
         Kind::Casimir
+    }
+
+    /// Returns whether the energy depends on time. Then it runs as an open system alone, and answers
+    /// [`power`](Self::power).
+    fn energy_depends_on_time(&self) -> bool {
+        false
+    }
+
+    /// Computes the rate `∂_tH(t, x)` at which the energy changes at a state that stands still: the power of what changes it.
+    fn power(&self, t: f64, x: &[f64]) -> f64 {
+        let _ = (t, x);
+        0.0
     }
 
     /// Checks that the entries are a state.

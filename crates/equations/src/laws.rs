@@ -5,8 +5,8 @@
 
 use crate::judge::{Derivatives, OF_SOLUTIONS, Row};
 use crate::{
-    BrokenLaw, Covectors, ENTROPY, Equations, Jet, Model, Part, Path, PathAt, PathSlopes, Paths,
-    SecondLaw, Sizes,
+    BrokenLaw, Covectors, ENERGY, ENTROPY, Equations, Jet, Model, Part, Path, PathAt, PathSlopes,
+    Paths, SecondLaw, Sizes,
 };
 
 /// The rest of terms that should cancel, relative to them: closures may lose some digits.
@@ -19,7 +19,7 @@ const CANCELS: f64 = 1e-9;
 ///    the further invariants, the production is not negative, and it is `⟨dS, x'⟩` of an
 ///    [exact](SecondLaw::Exact) second law; 6. `ψ_x(0) = x`, the rates
 ///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`; 7. in a vector space both charts are `x + u`, the
-///    rates in them are the velocity, and the sizes are `|x_i|`.
+///    rates in them are the velocity, and the sizes are `|x_i|`; 8. the power is the derivative of the energy along time.
 ///
 /// The fifth law is that of a closed system.
 ///
@@ -56,6 +56,13 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
             to.push(values[law]);
         })?;
     }
+
+    let unit = if t == 0.0 { 1.0 } else { t.abs() };
+    derivative("∂_tH is the power", &[unit * system.power(t, x)], &|s, to| {
+        let mut values = nan(laws);
+        system.values(t + s * unit, x, &mut values);
+        to.push(values[ENERGY]);
+    })?;
 
     let (mut v, mut rates) = (nan(n), nan(n));
     let Some(production) = system.velocity(t, x, &mut v) else { return Ok(()) };

@@ -20,6 +20,7 @@
 //! | [`model`] | [`Model`]: the bracket, the force, the dissipation and the metric apart, with their derivatives |
 //! | [`paths`] | [`Paths`]: the paths of steps on spaces that are not flat |
 //! | [`differences`] | [`Differences`]: a model whose derivatives are formed by differences of its parts |
+//! | [`terms`] | [`FrictionTerms`]: a friction as a sum of terms, of which thermal noise is made |
 //! | [`judge`] | the laws of a model at a start, around it, and at the states of a run |
 //! | [`report`] | [`Report`]: the residual of every law |
 //! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
@@ -42,6 +43,7 @@ mod pointers;
 pub mod report;
 pub mod room;
 pub mod second_law;
+pub mod terms;
 
 pub use broken_law::BrokenLaw;
 pub use differences::{Apart, Differences, Slopes, slopes};
@@ -55,3 +57,4 @@ pub use point_error::PointError;
 pub use pointers::VerifiedEquations;
 pub use report::{LawResidual, Report};
 pub use second_law::SecondLaw;
+pub use terms::{FrictionTerms, Terms};

@@ -341,7 +341,8 @@ pub enum ModelError {
     /// The derivative of the energy along time is not that of its values.
     #[error(
         "the energy has the derivative {derivative:.6e} along time at t = {time}, {point:?}, but its values change at the rate \
-         {quotient:.6e}: the closure loses the derivative of `t`, as `t.re` does; compute with `t` as a `Real`"
+         {quotient:.6e}: the closure loses the derivative of `t`, as `t.re` does; compute with `t` as a `Real`. In a system of your own correct \
+         `Equations::power`"
     )]
     LostTimeDerivative {
         /// The time.
@@ -352,6 +353,24 @@ pub enum ModelError {
         derivative: f64,
         /// The difference quotient of the values.
         quotient: f64,
+    },
+    /// The energy of a system of your own depends on time, and the system is closed or does not say so.
+    #[error(
+        "the energy depends on time: open the system by `.opened()`, which books the work of the time, and answer \
+         `Equations::energy_depends_on_time` and `Equations::power`; a closed run asks at the time 0 alone"
+    )]
+    EnergyInTime,
+    /// A contact of a bath acts on a direction that does not exist.
+    #[error(
+        "a contact of the bath `{bath}` acts on the direction {direction} of {directions}, which are counted from 0"
+    )]
+    ContactOutside {
+        /// The name of the bath.
+        bath: Arc<str>,
+        /// The direction.
+        direction: usize,
+        /// How many there are.
+        directions: usize,
     },
     /// A system of your own says sizes that cannot be.
     #[error(

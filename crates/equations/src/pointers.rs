@@ -10,6 +10,12 @@ use crate::{Equations, Kind, Model, ModelError, PointError, SecondLaw, Sizes};
 #[derive(Clone, Copy, Debug)]
 pub struct VerifiedEquations<S>(S);
 
+impl<S> VerifiedEquations<S> {
+    pub(crate) const fn inner(&self) -> &S {
+        &self.0
+    }
+}
+
 impl<S: Equations> VerifiedEquations<S> {
     /// Verifies a system around a state, each coordinate within a tenth of its size.
     ///
@@ -53,6 +59,16 @@ macro_rules! answers {
             fn kind(&self, invariant: usize) -> Kind {
                 let $this = self;
                 $other.kind(invariant)
+            }
+
+            fn energy_depends_on_time(&self) -> bool {
+                let $this = self;
+                $other.energy_depends_on_time()
+            }
+
+            fn power(&self, t: f64, x: &[f64]) -> f64 {
+                let $this = self;
+                $other.power(t, x)
             }
 
             fn check(&self, x: &[f64]) -> Result<(), PointError> {

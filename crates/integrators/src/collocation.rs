@@ -60,7 +60,7 @@ pub(crate) mod equation;
 pub(crate) mod fallbacks;
 pub(crate) mod full;
 pub(crate) mod heat;
-mod in_time;
+pub(crate) mod in_time;
 pub(crate) mod linear;
 pub(crate) mod memory;
 pub(crate) mod parts;

@@ -23,7 +23,7 @@ use metriplectic_equations::{Equations, Model, Path};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 pub(crate) use self::algebra::Matrix;
-pub(crate) use self::collocation::{Collocation, StageNumbers, StageRoot};
+pub(crate) use self::collocation::{Collocation, StageNumbers, StageRoot, TimeOfStep, WorkOfTime};
 pub(crate) use self::driven::{DrivenMethod, DrivenStage, DrivenStart, DrivenStep};
 pub(crate) use self::midpoint::Midpoint;
 pub(crate) use self::midpoint::{FromEnd, MidpointNumbers, from_end};

@@ -69,7 +69,7 @@ pub use noise::{
     RandomFlow, Sampler, Sampling,
 };
 pub use numbers::FromEquations;
-pub use open::{NotDamped, OpenBuilder, OpenSpace, OpenState, OpenSystem};
+pub use open::{NotDamped, OpenBuilder, OpenEquations, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,

@@ -15,10 +15,11 @@ use std::sync::Arc;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{Erase, ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
-use metriplectic_equations::{ENTROPY, Equations, Report, VerifiedEquations};
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
 pub(crate) use self::answered::{Answered, InTypes};
+pub(crate) use self::kept::Kept;
 pub(crate) use self::lengths::{AtRunTime, Known, Lengths, List};
 pub(crate) use self::of_length::OfLength;
 use self::projection::{Aim, Projection, sum};
@@ -111,7 +112,8 @@ impl<S: Equations> FromEquations<S> {
     ///
     /// [`ModelError`] that names the law, the state and the size of the violation.
     pub fn verify(&self, x0: &[f64], radius: f64) -> Result<(), ModelError> {
-        Judge::of(&self.0, NO_CLOCK).verify(x0, radius)
+        Judge::of(&self.0, NO_CLOCK).verify(x0, radius)?;
+        if energy_changes(&self.0, NO_CLOCK, x0) { Err(ModelError::EnergyInTime) } else { Ok(()) }
     }
 
     /// Lists the residual of every law around a state. Read it when a new system misbehaves.
@@ -126,7 +128,11 @@ impl<S: Equations> FromEquations<S> {
     ///
     /// The errors of [`verify`](Self::verify).
     pub fn verified(self, x0: &[f64]) -> Result<FromEquations<VerifiedEquations<S>>, ModelError> {
-        VerifiedEquations::around(self.0, x0).map(FromEquations)
+        let verified = VerifiedEquations::around(self.0, x0)?;
+        if energy_changes(&verified, NO_CLOCK, x0) {
+            return Err(ModelError::EnergyInTime);
+        }
+        Ok(FromEquations(verified))
     }
 }
 
@@ -137,6 +143,21 @@ impl<S: Equations + Send + Sync + 'static> Erase for FromEquations<S> {
     fn erased(self) -> Self::Erased {
         FromEquations(Arc::new(self.0))
     }
+}
+
+/// Returns whether the energy of a system depends on time: whether the system says so, or its values at this state change with it.
+pub(crate) fn energy_changes(system: &dyn Equations, t: f64, x: &[f64]) -> bool {
+    let energy = |t: f64| {
+        let mut values = Entries::zeros(system.sizes().laws);
+        system.values(t, x, &mut values);
+        values[ENERGY]
+    };
+    let (here, unit) = (energy(t), if t == 0.0 { 1.0 } else { t.abs() });
+    let changes = |exponent: i32| {
+        let later = energy(t + unit * 2_f64.powi(exponent));
+        later.to_bits() != here.to_bits() && later.is_finite()
+    };
+    system.energy_depends_on_time() || (-20..=20).step_by(5).any(changes)
 }
 
 impl<S> FromEquations<S> {
@@ -325,7 +346,7 @@ mod tests {
     };
     use metriplectic_dynamics::bracket::{AreaForm, Zero};
     use metriplectic_dynamics::{InNumbers, Metriplectic, System, Verify as _, system::Point};
-    use metriplectic_equations::{ENERGY, Sizes};
+    use metriplectic_equations::Sizes;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{Euclidean, LieDual, Manifold, Product, Sphere};
     use nalgebra::{Vector1, Vector3, vector};

@@ -31,9 +31,12 @@
 //! would move a state near rest, and a protocol that jumps inside a step would do the wrong work at each step size.
 //! The midpoint scheme takes the symmetric form `½ [H(t', x') − H(t, x') + H(t', x) − H(t, x)]`.
 
+mod as_flow;
 mod balance;
+mod beside;
 mod builder;
 mod clock;
+mod equations;
 mod flow;
 mod halves;
 mod in_numbers;
@@ -42,18 +45,26 @@ mod noise;
 mod projection;
 mod stages;
 mod state;
+#[doc(hidden)]
+pub mod surrounded;
 mod system;
 mod vector;
 mod verify;
 mod view;
 
+#[doc(hidden)]
+pub use crate::open_flow;
+pub use beside::Beside;
 pub use builder::{OpenBuilder, Opened, Opening, Timed, With};
 pub use clock::{AtTime, Clock, InTime, OfTime, Still};
-pub use in_numbers::{Exchanged, OpenFlow, OpenSteps};
+pub use equations::{EntriesAt, OpenEquations};
+pub use in_numbers::OpenSteps;
 pub use projection::OpenGradients;
 pub use stages::NotDamped;
 pub use state::{Booked, Ledger, OpenSpace, OpenState};
+pub use surrounded::{Exchanged, OpenFlow, OpenJets};
 pub use system::OpenSystem;
 pub(crate) use system::StateOf;
 pub use vector::OpenVector;
+pub use verify::compare_with_values;
 pub use view::{Closed, EnergyAt, Frozen};

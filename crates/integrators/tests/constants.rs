@@ -57,6 +57,7 @@ const UNNOTICED: &[(&str, &str)] = &[
     ("open/balance.rs", "LAST_DIGITS"),
     ("open/flow.rs", "AHEAD"),
     ("open/flow.rs", "LITTLE"),
+    ("open/surrounded.rs", "LITTLE"),
     ("open/verify.rs", "AGREEING"),
     ("open/verify.rs", "CLEAR"),
     ("run/controller.rs", "APART"),

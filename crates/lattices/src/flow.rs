@@ -4,9 +4,9 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
+use metriplectic_integrators::open::surrounded::against_simpson;
 use metriplectic_integrators::{
-    Element, Entries, Flow, FlowError, Laws, Listed, Recheck, StageFlow, StateSpace as _,
-    Vector as _,
+    Entries, Flow, FlowError, Laws, Listed, Recheck, StageFlow, StateSpace as _, Vector as _,
 };
 use metriplectic_manifolds::{Manifold, PointError};
 
@@ -88,24 +88,6 @@ impl<V> LatticeJets<V> {
 
 fn values(sums: &[Total]) -> Vec<f64> {
     sums.iter().map(|total| total.sum.value()).collect()
-}
-
-/// The difference between a displacement and Simpson's rule over it, with the middle of the cubic through both ends.
-pub(crate) fn against_simpson<F: Flow>(
-    flow: &F,
-    x: &Element<F>,
-    end: &Element<F>,
-    h: f64,
-) -> Option<F::Vector> {
-    let q = flow.displacement(x, end)?;
-    let (start, there) = (flow.rates(x, &q.zero())?, flow.rates(x, &q)?);
-    let middle = F::Vector::zip([&q, &there, &start], |[q, there, start]| {
-        0.5 * q - (there - start) * (h / 8.0)
-    });
-    let middle = flow.rates(x, &middle)?;
-    Some(F::Vector::zip([&q, &start, &middle, &there], |[q, start, middle, there]| {
-        q - (start + 4.0 * middle + there) * (h / 6.0)
-    }))
 }
 
 impl<P: Model> Flow for Lattice<P> {

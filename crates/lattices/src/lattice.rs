@@ -5,6 +5,7 @@ mod differentials;
 mod motion;
 
 use std::fmt;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use metriplectic_fields::{Column, Dimension, Space, Vector};
@@ -30,7 +31,7 @@ pub(crate) use motion::probed;
 /// the schemes, `Gauss` and `Radau` run it too, with Jacobians of all pairs of variables, along the lines of the charts of the sites.
 pub struct Lattice<P> {
     pub(crate) parts: P,
-    pub(crate) layout: Layout,
+    pub(crate) layout: Arc<Layout>,
     /// Arrays with a vector for each site.
     pub(crate) vectors: Pool<f64>,
     /// Arrays with the differentials of energy and entropy for each site.
@@ -42,7 +43,7 @@ pub struct Lattice<P> {
     /// Arrays with two numbers for each site, and with a number for each slot.
     sums: [Pool<f64>; 2],
     /// True once the differential of the entropy was seen to differ from site to site.
-    entropy_differs: AtomicBool,
+    entropy_differs: Arc<AtomicBool>,
     /// True once its laws were verified.
     pub(crate) verified: bool,
 }
@@ -165,10 +166,10 @@ impl<P: Model> Lattice<P> {
         let [vectors, differentials, slots, both_slots, at_sites, in_slots] =
             std::array::from_fn(|_| Pool::default());
         let sums = [at_sites, in_slots];
-        let entropy_differs = AtomicBool::new(false);
+        let entropy_differs = Arc::new(AtomicBool::new(false));
         Self {
             parts,
-            layout,
+            layout: Arc::new(layout),
             vectors,
             differentials,
             slots,
@@ -176,6 +177,21 @@ impl<P: Model> Lattice<P> {
             sums,
             entropy_differs,
             verified: false,
+        }
+    }
+
+    /// The lattice with other parts on the same graph, and with the arrays of this one.
+    pub(crate) fn with_parts<Q: Model<Manifold = P::Manifold>>(&self, parts: Q) -> Lattice<Q> {
+        Lattice {
+            parts,
+            layout: Arc::clone(&self.layout),
+            vectors: self.vectors.clone(),
+            differentials: self.differentials.clone(),
+            slots: self.slots.clone(),
+            both_slots: self.both_slots.clone(),
+            sums: self.sums.clone(),
+            entropy_differs: Arc::clone(&self.entropy_differs),
+            verified: self.verified,
         }
     }
 
@@ -193,7 +209,7 @@ impl<P: Model> Lattice<P> {
     }
 
     /// The number of sites.
-    pub const fn sites(&self) -> usize {
+    pub fn sites(&self) -> usize {
         self.layout.sites
     }
 

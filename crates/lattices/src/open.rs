@@ -4,8 +4,8 @@
 //! x_i' = \Pi(x_i)\, w_i + \sum_j K_{ij} (s_i, s_j) + K_i s_i + \sum_a F_a(t, i, x_i) + \sum_b R_b(t, i, x_i) (T_b\, s_i - w_i)
 //! ```
 //!
-//! with the differentials `w_i` and `s_i` of the total energy and entropy at a site. The laws are those of
-//! [open systems](metriplectic_integrators::open): `H − ΣW_a − ΣQ_b` stays what it was, and `S + ΣS_b` does not fall.
+//! with the differentials `w_i` and `s_i` of the total energy and entropy at a site, of which the energy may depend on time. The laws are those of
+//! [open systems](metriplectic_integrators::open): `H − W_t − ΣW_a − ΣQ_b` stays what it was, and `S + ΣS_b` does not fall.
 //! Neither the clock nor the ledger is an entry of a site.
 //!
 //! An entry of the ledger is a sum over the sites of its port or bath. It is summed in double digits, in chunks of a fixed
@@ -13,27 +13,26 @@
 
 mod dense;
 mod flow;
+mod in_time;
 mod noise;
 mod parts;
-mod stages;
-mod vector;
 mod verify;
 
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_integrators::StateSpace;
-use metriplectic_integrators::open::{Ledger, OpenState};
-use metriplectic_manifolds::Manifold;
+use metriplectic_fields::{Real, Space};
+use metriplectic_integrators::OpenSpace;
+use metriplectic_integrators::open::{Beside, Ledger, OpenState};
 
 use crate::lattice::Lattice;
 use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::{Onsager, SiteState};
 use crate::points::{Points, Sites};
+use crate::vector::SiteVector;
+use in_time::Field;
 pub use noise::NoisySurroundings;
 use parts::{Part, PartKind};
-pub use stages::OpenJets;
-pub use vector::OpenSiteVector;
 
 /// A [`Lattice`] with ports and baths at some of its sites; made by [`Lattice::opened`].
 ///
@@ -73,6 +72,8 @@ pub use vector::OpenSiteVector;
 /// ```
 pub struct OpenLattice<P: Model> {
     lattice: Lattice<P>,
+    /// The energies of sites that depend on time.
+    fields: Vec<Box<Field<P>>>,
     parts: Vec<Part<P>>,
     /// True once its laws were verified, with those of its parts.
     verified: bool,
@@ -95,25 +96,20 @@ impl<P: Model> fmt::Debug for OpenLattice<P> {
 pub(crate) type StateOf<P> = OpenState<Points<<P as Model>::Manifold>>;
 
 /// The space of the states of an open lattice: points of `M` at the sites, with the time and a ledger.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct OpenSites<M>(std::marker::PhantomData<M>);
-
-impl<M: Manifold> StateSpace for OpenSites<M> {
-    type Element = OpenState<Points<M>>;
-
-    /// The entries of all points, site by site, the time, and the numbers of the ledger.
-    fn numbers(x: &Self::Element) -> Vec<f64> {
-        let mut numbers = Sites::<M>::numbers(&x.x);
-        numbers.push(x.time);
-        numbers.extend(x.ledger.numbers());
-        numbers
-    }
-}
+pub type OpenSites<M> = OpenSpace<Sites<M>>;
+/// A displacement or a rate of an open lattice.
+type OpenSiteVector = Beside<SiteVector>;
 
 impl<P: Model> Lattice<P> {
     /// The lattice with surroundings, which have no part yet.
     pub fn opened(self) -> OpenLattice<P> {
-        OpenLattice { lattice: self, parts: Vec::new(), verified: false, empty: Ledger::of([]) }
+        OpenLattice {
+            lattice: self,
+            fields: Vec::new(),
+            parts: Vec::new(),
+            verified: false,
+            empty: Ledger::of([]),
+        }
     }
 }
 
@@ -126,6 +122,47 @@ impl<P: Model> OpenLattice<P> {
     /// The state in which a run starts at these points: its time is that of the run, and nothing is booked yet.
     pub fn start(&self, points: Points<P::Manifold>) -> StateOf<P> {
         OpenState { x: points, time: 0.0, ledger: self.empty.clone() }
+    }
+
+    /// Adds an energy `h(t, i, x_i)` of each site that depends on time, such as that of a field which turns: a closure of the time, of
+    /// the number of the site and of its point. It does the work `Σ_i ∂_t h` on the lattice, which the ledger books as that of the
+    /// [time](Ledger::parameter_work).
+    ///
+    /// ```
+    /// use metriplectic_dynamics::bracket::AreaForm;
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Method, Span};
+    /// use metriplectic_lattices::{Graph, Lattice};
+    /// use metriplectic_manifolds::Sphere;
+    /// use nalgebra::{ComplexField, Vector3, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A ring of spins in a field that turns.
+    /// let ring = Lattice::on(Graph::ring(8), Sphere::<2>::round())
+    ///     .bracket(AreaForm)
+    ///     .bond_energy(|(a, b): &(Vector3<Real>, Vector3<Real>)| -a.dot(b))
+    ///     .build()?
+    ///     .opened()
+    ///     .energy_in_time(|t, _, n: &Vector3<Real>| -(n.x * t.cos() + n.y * t.sin()));
+    /// let start = ring.start(ring.lattice().points(|_| vector![0.6, 0.0, 0.8]));
+    /// let before = ring.energy_at(&start);
+    /// let run = DormandPrince8.run(&ring, start, Span::until(20.0).tolerance(1e-9))?;
+    /// let end = &run.last().point;
+    /// let gained = ring.energy_at(end) - before;
+    /// assert!((gained - end.ledger.parameter_work()).abs() < 1e-13 && gained.abs() > 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn energy_in_time(
+        mut self,
+        energy: impl Fn(Real, usize, &<P::Manifold as Space>::Point<Real>) -> Real
+        + Send
+        + Sync
+        + 'static,
+    ) -> Self {
+        self.fields.push(Box::new(energy));
+        self.verified = false;
+        self
     }
 
     /// Appends a port at some sites: a velocity `F(t, i, x_i)` in the frame of the chart at `x_i`, such as a force on a
@@ -179,7 +216,7 @@ impl<P: Model> OpenLattice<P> {
     /// The energy of the lattice at a state. The energy of a [state of a run](metriplectic_integrators::State) is the
     /// balance `H − W − Q` instead, which stays what it was at the start.
     pub fn energy_at(&self, state: &StateOf<P>) -> f64 {
-        self.lattice.totals(&state.x)[0].sum.value()
+        self.at(state.time).totals(&state.x)[0].sum.value()
     }
 
     /// The entropy of the lattice at a state, without that of the baths.

@@ -1,6 +1,7 @@
 //! The derivatives of runs of lattices, by differences of steps.
 
 use metriplectic_fields::{Column as _, Real, Space, Vector as Components};
+use metriplectic_integrators::open::OpenFlow as _;
 use metriplectic_integrators::tangent::{Differentiated, LawRows, SmoothFlow, between};
 use metriplectic_integrators::{Element, Flow as _, Laws, Listed as _, Stepper, Vector as _};
 use nalgebra::{DMatrix, DVector};
@@ -100,7 +101,7 @@ impl<P: Model> SmoothFlow for OpenLattice<P> {
     type Moving = Moving<P>;
 
     fn directions(&self) -> usize {
-        // The clock, and what ports and baths book.
+        // The clock, the work of the time, and what ports and baths book.
         self.lattice().directions() + 1 + self.layout().entry_sizes().len()
     }
 
@@ -108,10 +109,15 @@ impl<P: Model> SmoothFlow for OpenLattice<P> {
         Some(self.lattice().directions())
     }
 
-    /// The differentials of the balance `H − W − Q` and of `S + Σ S_b`.
+    fn power_of_time(&self, x: &Element<Self>) -> Option<(usize, f64)> {
+        let place = self.lattice().directions() + 1;
+        self.has_clock().then(|| (place, self.power(x.time, &x.x)))
+    }
+
+    /// The differentials of the balance `H − W − Q` and of `S + Σ S_b`. The clock moves neither: the frozen work is booked.
     fn law_rows(&self, x: &Element<Self>) -> LawRows<DVector<f64>> {
         let (n, all) = (self.lattice().directions(), self.directions());
-        let rows = self.lattice().law_rows(&x.x);
+        let rows = self.at(x.time).law_rows(&x.x);
         let mut rows = rows.map(|row| row.clone().resize_vertically(all, 0.0));
         let (start, zero) = (self.start(x.x.clone()), self.sizes(x).zero());
         for i in n + 1..all {

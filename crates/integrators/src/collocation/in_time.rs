@@ -55,13 +55,17 @@ pub(super) fn frozen_share<Y: Metriplectic>(
     stages: &[Point<Y>],
     z: &Point<Y>,
 ) -> f64 {
+    share(tableau, |i| [&stages[i], z].map(|x| in_time.energy.rate(tableau.nodes[i], x)))
+}
+
+/// The share for the rates at each stage and at the frozen state.
+pub(crate) fn share(tableau: &Tableau, rates: impl Fn(usize) -> [f64; 2]) -> f64 {
     if !tableau.one_sided {
         return 1.0;
     }
     let [mut along, mut beside] = [0.0; 2];
-    for (i, x) in stages.iter().enumerate().take(tableau.stages) {
-        let (node, weight) = (tableau.nodes[i], tableau.weights[i]);
-        let [rate, frozen] = [x, z].map(|x| in_time.energy.rate(node, x));
+    for (i, weight) in tableau.weights.iter().enumerate().take(tableau.stages) {
+        let [rate, frozen] = rates(i);
         along += weight * rate.abs();
         beside += weight * (rate - frozen).abs();
     }

@@ -38,7 +38,7 @@ pub(crate) struct Tableau {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
     /// The fraction of the step.
-    pub(super) node: f64,
+    pub(crate) node: f64,
     /// Its weight.
     pub(crate) weight: f64,
     /// The coefficients `∫₀^τ ℓ_j − b_j/2` of the position from the middle of the step.

@@ -6,6 +6,7 @@
 )]
 
 mod chart;
+mod clock;
 mod covectors;
 mod dense;
 mod equation;
@@ -21,7 +22,9 @@ mod solve;
 mod step;
 mod timed;
 
+pub(super) use clock::Clock;
+pub(crate) use clock::{TimeOfStep, WorkOfTime};
 pub(crate) use memory::StageNumbers;
 pub(crate) use root::StageRoot;
 pub(crate) use step::Collocation;
-pub(super) use timed::{Stage, StageSolution, TimedStep};
+pub(super) use timed::{Frozen, Stage, StageSolution, TimedStep};

@@ -110,7 +110,7 @@ pub(crate) struct Parts<'a, L: Lengths> {
     curved: Option<Curved<'a>>,
     has_metric: bool,
     entries: usize,
-    /// The time of its force, which nothing else depends on.
+    /// The time of its force and of its energy.
     time: f64,
     count: usize,
     /// Why each further invariant is conserved.
@@ -153,7 +153,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         }
     }
 
-    /// The model with its force at a time.
+    /// The model at a time.
     pub(super) fn at(&self, time: f64) -> Self {
         Self { time, kinds: self.kinds.clone(), ..*self }
     }

@@ -3,8 +3,11 @@
 use metriplectic_equations::{Equations, Kind, Model, PointError, SecondLaw, Sizes};
 
 /// A system whose sizes and promise are asked for once, and which is not asked for the charts of a vector space.
-pub(crate) struct Kept<'a> {
+#[expect(missing_debug_implementations, reason = "systems have no `Debug`")]
+pub struct Kept<'a> {
     system: &'a dyn Equations,
+    /// The time at which it is asked, whatever time it is.
+    time: Option<f64>,
     sizes: Sizes,
     second_law: SecondLaw,
     is_vector_space: bool,
@@ -13,7 +16,18 @@ pub(crate) struct Kept<'a> {
 impl<'a> Kept<'a> {
     pub(crate) fn new(system: &'a dyn Equations) -> Self {
         let (sizes, second_law) = (system.sizes(), system.second_law());
-        Self { system, sizes, second_law, is_vector_space: system.is_vector_space() }
+        let is_vector_space = system.is_vector_space();
+        Self { system, time: None, sizes, second_law, is_vector_space }
+    }
+
+    /// The system at one time, whose parts are not known apart: they would be asked at another one.
+    pub(crate) fn at(system: &'a dyn Equations, time: f64) -> Self {
+        Self { time: Some(time), ..Self::new(system) }
+    }
+
+    #[inline]
+    fn time(&self, t: f64) -> f64 {
+        self.time.unwrap_or(t)
     }
 }
 
@@ -32,17 +46,17 @@ impl Equations for Kept<'_> {
     }
 
     fn values(&self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.system.values(t, x, values);
+        self.system.values(self.time(t), x, values);
     }
 
     #[inline]
     fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
-        self.system.differentials(t, x, values, w);
+        self.system.differentials(self.time(t), x, values, w);
     }
 
     #[inline]
     fn velocity(&self, t: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
-        self.system.velocity(t, x, v)
+        self.system.velocity(self.time(t), x, v)
     }
 
     #[inline]
@@ -131,12 +145,12 @@ impl Equations for Kept<'_> {
 
     #[inline]
     fn velocity_with(&self, t: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
-        self.system.velocity_with(t, x, w, v)
+        self.system.velocity_with(self.time(t), x, w, v)
     }
 
     #[inline]
     fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
-        self.system.stage(t, x, q, rates)
+        self.system.stage(self.time(t), x, q, rates)
     }
 
     fn is_verified(&self) -> bool {
@@ -145,6 +159,6 @@ impl Equations for Kept<'_> {
 
     #[inline]
     fn model(&self) -> Option<&dyn Model> {
-        self.system.model()
+        if self.time.is_some() { None } else { self.system.model() }
     }
 }

@@ -53,7 +53,7 @@ impl<L: Lengths> Rows<L> {
 
     /// The differentials of all laws, one after another.
     #[inline]
-    pub(super) fn all(&self) -> &[f64] {
+    pub(crate) fn all(&self) -> &[f64] {
         self.w.numbers()
     }
 }

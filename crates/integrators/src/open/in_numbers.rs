@@ -9,19 +9,24 @@
 //! ```
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::{Equations, Model, Path, Sizes};
+use metriplectic_equations::{
+    Apart, Covectors, Differences, Equations, Kind, MetricError, Part, Path, PathAt, PathSlopes,
+    Paths, PointError, Sizes,
+};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 use super::balance::balanced;
+use super::beside::Beside;
 use super::halves::{self, Failure};
 use super::stages::NotDamped;
 use super::state::OpenState;
+use super::surrounded::{OpenFlow, PointOf};
 use crate::collocation::dense::Within;
 use crate::collocation::{Gauss, Radau, control};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::implicit::{
     Collocation, DrivenMethod, DrivenStage, DrivenStart, DrivenStep, Midpoint, MidpointNumbers,
-    NoImplicitSteps, StageNumbers, midpoint, refuse,
+    NoImplicitSteps, StageNumbers, TimeOfStep, WorkOfTime, midpoint, refuse,
 };
 use crate::midpoint::Scheme;
 use crate::midpoint::step::scheme_name;
@@ -29,52 +34,9 @@ use crate::numbers::AtRunTime;
 use crate::step::dense::{self, Target};
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Control, Directions, Element, Entries, Flow, Laws, LedgerErrors, Memory, MethodError, Promises,
-    Refusal, StateSpace, StepEnds, StepError, StepStart, Taken, Values,
+    Control, Directions, Element, Entries, Flow, Laws, LedgerErrors, Listed, Memory, MethodError,
+    Promises, Refusal, StepEnds, StepError, StepStart, Taken, Values, Vector as _,
 };
-
-/// The effect of all ports and baths, in a unit of time.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Exchanged {
-    /// The work of each port; the heat and the entropy of each bath.
-    pub entries: Vec<f64>,
-    /// The entropy `Σ_b ⟨A, R A⟩/T` that is produced.
-    pub production: f64,
-}
-
-/// An open flow whose states are a point with a time and a ledger, and whose model without clock and ledger is known in plain numbers.
-///
-/// [`OpenSteps`] are its implicit steps. Its energy does not depend on time.
-pub trait OpenFlow: Flow<Space: StateSpace<Element = OpenState<Self::Point>>> {
-    /// The point of a state.
-    type Point: Clone;
-
-    /// Calls `f` with the model of the points, on which the ports and the baths act as its force, the
-    /// [gyroscopic part](metriplectic_equations::Part::Gyroscopic): the sum of their velocities at the time that it is asked for.
-    fn with_equations<T>(&self, f: impl FnOnce(&dyn Equations) -> T) -> T;
-
-    /// Writes a point.
-    fn entries(&self, x: &Self::Point) -> Entries;
-
-    /// Reads a point.
-    fn point(&self, entries: &[f64]) -> Self::Point;
-
-    /// The displacement by the components of a point, and by entries of the ledger at a clock that stands.
-    fn direction(&self, v: &Directions, entries: &[f64]) -> Self::Vector;
-
-    /// The laws of the model at a point, without the surroundings.
-    fn laws_of_point(&self, x: &Self::Point) -> Laws<Self::Numbers>;
-
-    /// Sums the effects of ports and baths at a time, at a point with these covectors of energy and entropy. `None` where they have
-    /// no value, or a temperature is negative.
-    fn exchanged(&self, t: f64, x: &[f64], w: [&[f64]; 2]) -> Option<Exchanged>;
-
-    /// The number of baths.
-    fn bath_count(&self) -> usize;
-
-    /// The temperature of each bath at a time, with the index of its heat among the entries of the ledger.
-    fn baths(&self, t: f64) -> Vec<(usize, f64)>;
-}
 
 /// An implicit method with steps of an [`OpenFlow`]: those of a [`Scheme`], of `Gauss` and of `Radau`.
 ///
@@ -153,26 +115,242 @@ pub trait OpenSteps {
     }
 }
 
+/// Refuses a flow without implicit steps.
+fn serves<F: OpenFlow>(flow: &F, path: Path) -> Result<(), NoImplicitSteps> {
+    flow.serve_points(path)?;
+    refuse(&Differences(Driven(flow, None)), path)
+}
+
 /// The laws that an implicit method keeps.
 fn promises(flow: &impl Flow) -> Promises {
     Promises::all_laws(flow.entropy_law() == SecondLaw::Exact)
 }
 
-/// The model of a flow. A run has asked before it whether there is one.
-fn model(equations: &dyn Equations) -> &dyn Model {
-    equations.model().expect("a run refuses a system without a model")
+/// An open flow in plain numbers: its points, with ports and baths as a force, whose energy is the mean of those at two times, or where
+/// there are none that at the time that it is asked for.
+struct Driven<'a, F>(&'a F, Option<[f64; 2]>);
+
+/// Writes a point.
+fn written<F: OpenFlow>(x: &PointOf<F>) -> Entries {
+    <F::Closed<'_> as Listed>::write(x)
 }
 
-/// Calls `f` with the start of a step of size `h`, which takes back these errors of earlier steps.
+/// Reads a point.
+fn point<F: OpenFlow>(entries: &[f64]) -> PointOf<F> {
+    <F::Closed<'_> as Listed>::read(&(), entries)
+}
+
+impl<F: OpenFlow> Driven<'_, F> {
+    /// Asks the points at a time. A run has asked before it whether their parts are known.
+    fn ask<T>(&self, t: f64, f: impl FnOnce(&dyn Apart) -> T) -> T {
+        self.0.with_parts(t, f).expect("a run refuses a system without a model")
+    }
+
+    /// Fills lists at the time, or with the means of those at both times.
+    fn mean<const K: usize>(
+        &self,
+        t: f64,
+        mut to: [&mut [f64]; K],
+        f: impl Fn(&dyn Apart, f64, [&mut [f64]; K]),
+    ) {
+        let [t, end] = self.1.unwrap_or([t; 2]);
+        self.ask(t, |parts| f(parts, t, to.each_mut().map(|to| &mut **to)));
+        if t.to_bits() == end.to_bits() || !self.0.has_clock() {
+            return;
+        }
+        let mut after = to.each_ref().map(|to| to.to_vec());
+        self.ask(end, |parts| f(parts, end, after.each_mut().map(|to| &mut **to)));
+        for (to, after) in to.iter_mut().zip(&after) {
+            to.iter_mut().zip(after).for_each(|(to, after)| *to = 0.5 * (*to + after));
+        }
+    }
+}
+
+impl<F: OpenFlow> Equations for Driven<'_, F> {
+    fn sizes(&self) -> Sizes {
+        self.ask(0.0, |parts| parts.sizes())
+    }
+
+    fn values(&self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.mean(t, [values], |parts, t, [values]| parts.values(t, x, values));
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.mean(t, [values, w], |parts, t, [values, w]| parts.differentials(t, x, values, w));
+    }
+
+    fn velocity(&self, t: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        let (velocity, exchanged) = self.0.velocity_of(t, &point::<F>(x), None)?;
+        v.copy_from_slice(&velocity.to_list());
+        Some(exchanged.production)
+    }
+
+    fn second_law(&self) -> SecondLaw {
+        self.ask(0.0, |parts| parts.second_law())
+    }
+
+    fn kind(&self, invariant: usize) -> Kind {
+        self.ask(0.0, |parts| parts.kind(invariant))
+    }
+
+    fn check(&self, x: &[f64]) -> Result<(), PointError> {
+        self.ask(0.0, |parts| parts.check(x))
+    }
+
+    fn defect(&self, x: &[f64]) -> f64 {
+        self.ask(0.0, |parts| parts.defect(x))
+    }
+
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        self.ask(0.0, |parts| parts.scales(x, sizes));
+    }
+
+    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+        self.ask(0.0, |parts| parts.chart(x, q, y));
+    }
+
+    fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
+        self.ask(0.0, |parts| parts.coordinates(x, y, q))
+    }
+}
+
+impl<F: OpenFlow> Apart for Driven<'_, F> {
+    fn has_charts(&self) -> bool {
+        self.ask(0.0, |parts| parts.has_charts())
+    }
+
+    fn paths(&self) -> Option<&dyn Paths> {
+        self.ask(0.0, |parts| parts.paths().is_some()).then_some(self)
+    }
+
+    fn is_zero(&self, part: Part) -> bool {
+        let is_zero = self.ask(0.0, |parts| parts.is_zero(part));
+        is_zero && !(part == Part::Gyroscopic && self.0.empty().has_entries())
+    }
+
+    fn is_poisson(&self) -> bool {
+        self.ask(0.0, |parts| parts.is_poisson())
+    }
+
+    fn apply(&self, part: Part, t: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
+        self.ask(t, |parts| {
+            if parts.is_zero(part) { v.fill(0.0) } else { parts.apply(part, t, x, w, alpha, v) }
+        });
+        if part == Part::Gyroscopic
+            && self.0.exchanged(t, x, [w.energy, w.entropy], Some(&mut *v)).is_none()
+        {
+            v.fill(f64::NAN);
+        }
+    }
+}
+
+impl<F: OpenFlow> Driven<'_, F> {
+    /// Asks the paths of the points.
+    fn along<T>(&self, f: impl FnOnce(&dyn Paths) -> T) -> T {
+        self.ask(0.0, |parts| f(parts.paths().expect("the points have paths")))
+    }
+}
+
+/// The paths of the points, which do not depend on time.
+impl<F: OpenFlow> Paths for Driven<'_, F> {
+    fn follows(&self, path: Path) -> bool {
+        self.along(|paths| paths.follows(path))
+    }
+
+    fn path(
+        &self,
+        path: Path,
+        x: &[f64],
+        u: &[f64],
+        to: &mut PathAt<'_>,
+    ) -> Result<(), MetricError> {
+        self.along(|paths| paths.path(path, x, u, to))
+    }
+
+    fn path_jet(
+        &self,
+        path: Path,
+        x: &[f64],
+        u: &[f64],
+        to: (&mut PathAt<'_>, &mut PathSlopes<'_>),
+    ) -> Result<(), MetricError> {
+        self.along(|paths| paths.path_jet(path, x, u, to))
+    }
+
+    fn end(&self, path: Path, x: &[f64], u: &[f64], end: &mut [f64]) -> Result<(), MetricError> {
+        self.along(|paths| paths.end(path, x, u, end))
+    }
+
+    fn curve(
+        &self,
+        path: Path,
+        start: (&[f64], &[f64], f64),
+        y: &mut [f64],
+        to: [&mut [f64]; 2],
+    ) -> Result<(), MetricError> {
+        self.along(|paths| paths.curve(path, start, y, to))
+    }
+
+    fn lost_digits(&self, path: Path, x: &[f64], u: &[f64], end: &[f64], lost: &mut [f64]) {
+        self.along(|paths| paths.lost_digits(path, x, u, end, lost));
+    }
+
+    fn accuracy(&self, path: Path) -> f64 {
+        self.along(|paths| paths.accuracy(path))
+    }
+
+    fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
+        self.along(|paths| paths.velocity_at(y, x, q, v, to));
+    }
+
+    fn turned(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
+        self.along(|paths| paths.turned(y, x, q, columns));
+    }
+
+    fn transport(&self, x: &[f64], y: &[f64], vectors: &mut [f64]) {
+        self.along(|paths| paths.transport(x, y, vectors));
+    }
+
+    fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
+        self.along(|paths| paths.pairing_size(w, v))
+    }
+}
+
+/// The work of the time in a step of an open flow.
+struct InStep<'a, F>(&'a F, [f64; 2]);
+
+impl<F: OpenFlow> WorkOfTime for InStep<'_, F> {
+    fn frozen(&self, x: &[f64]) -> f64 {
+        self.0.frozen_work(self.1, &point::<F>(x))
+    }
+
+    fn power(&self, t: f64, x: &[f64]) -> f64 {
+        self.0.power(t, &point::<F>(x))
+    }
+}
+
+/// Calls `f` with the start of a step of size `h`, which takes back these errors of earlier steps; with the mean of the energies at both
+/// ends for a midpoint scheme.
 fn driven<F: OpenFlow, T>(
     (flow, x, h): (&F, &Element<F>, f64),
+    has_mean_energy: bool,
     accumulated_error: Option<Laws<Values>>,
     f: impl FnOnce(&DrivenStart<'_>) -> T,
 ) -> T {
-    let values = in_values(&flow.laws_of_point(&x.x));
-    let (times, x) = ([x.time, x.time + h], &flow.entries(&x.x));
-    flow.with_equations(|equations| {
-        f(&DrivenStart { model: model(equations), x, times, h, values, accumulated_error })
+    let (times, entries) = ([x.time, x.time + h], &written::<F>(&x.x));
+    let mut values = in_values(&flow.at(x.time).laws(&x.x));
+    if has_mean_energy && flow.has_clock() {
+        values.energy = 0.5 * (values.energy + flow.at(times[1]).laws(&x.x).energy);
+    }
+    let work = InStep(flow, times);
+    f(&DrivenStart {
+        model: &Differences(Driven(flow, has_mean_energy.then_some(times))),
+        x: entries,
+        times: TimeOfStep(times),
+        clock: flow.has_clock().then_some(&work),
+        h,
+        values,
+        accumulated_error,
     })
 }
 
@@ -198,22 +376,22 @@ fn booked<F: OpenFlow>(
     h: f64,
 ) -> Option<(Element<F>, f64)> {
     let time = from.time + h;
-    let (mut entries, mut production) = (Vec::new(), 0.0);
+    let (mut entries, mut production) = (vec![step.work_of_time], 0.0);
     for DrivenStage { time, weight, x, w: [energy, entropy] } in &step.stages {
-        let rates = flow.exchanged(*time, x, [energy.numbers(), entropy.numbers()])?;
-        entries.resize(rates.entries.len(), 0.0);
-        let weight = h * weight;
-        entries.iter_mut().zip(&rates.entries).for_each(|(sum, rate)| *sum += weight * rate);
+        let rates = flow.exchanged(*time, x, [energy.numbers(), entropy.numbers()], None)?;
+        entries.resize(1 + rates.entries.len(), 0.0);
+        let (weight, sums) = (h * weight, entries[1..].iter_mut());
+        sums.zip(&rates.entries).for_each(|(sum, rate)| *sum += weight * rate);
         production += weight * rates.production;
     }
     if step.lost < 0.0 {
         // What a step has damped is heat of the only bath.
         let &[(heat, temperature)] = flow.baths(time).as_slice() else { return None };
-        entries[heat] += step.lost;
-        entries[heat + 1] -= if temperature > 0.0 { step.lost / temperature } else { 0.0 };
+        entries[heat + 1] += step.lost;
+        entries[heat + 2] -= if temperature > 0.0 { step.lost / temperature } else { 0.0 };
     }
     let ledger = from.ledger.with_entries(&entries);
-    Some((OpenState { x: flow.point(&step.end), time, ledger }, production))
+    Some((OpenState { x: point::<F>(&step.end), time, ledger }, production))
 }
 
 /// Solves a step, and books it.
@@ -225,9 +403,9 @@ fn open_step<M: DrivenMethod, F: OpenFlow>(
     fallbacks: Fallbacks,
 ) -> Result<(Taken<F>, DrivenStep), Failure> {
     let flow = start.flow;
-    let from = (flow, start.x, h);
+    let (from, accumulated) = ((flow, start.x, h), Some(accumulated(start)));
     let solved =
-        driven(from, Some(accumulated(start)), |from| method.solve(from, memory, fallbacks));
+        driven(from, M::HAS_MEAN_ENERGY, accumulated, |from| method.solve(from, memory, fallbacks));
     let solved = solved.map_err(|(cause, residual, effort)| Failure { cause, residual, effort })?;
     let effort = solved.effort;
     let edge = || Failure { cause: Cause::Edge, residual: f64::INFINITY, effort };
@@ -244,22 +422,52 @@ fn open_step<M: DrivenMethod, F: OpenFlow>(
     Ok((Taken { x, values, evidence, effort }, solved))
 }
 
+/// A frozen point of the work of the time, with its share.
+type FrozenPoint<F> = (PointOf<F>, f64);
+
+/// The entries that are booked at a place in a unit of time: the work of the time beside that of a frozen point, then those of ports and
+/// baths with these covectors.
+fn rates_with<F: OpenFlow>(
+    flow: &F,
+    t: f64,
+    (x, entries): (&PointOf<F>, &[f64]),
+    w: [&[f64]; 2],
+    (z, share): &FrozenPoint<F>,
+) -> Option<Vec<f64>> {
+    let by_time = if flow.has_clock() { flow.power(t, x) - share * flow.power(t, z) } else { 0.0 };
+    let mut rates = vec![by_time];
+    rates.extend(flow.exchanged(t, entries, w, None)?.entries);
+    Some(rates)
+}
+
 /// The entries that are booked at a state in a unit of time.
-fn rates<F: OpenFlow>(flow: &F, at: &Element<F>) -> Option<Vec<f64>> {
-    let x = flow.entries(&at.x);
-    let (n, w) = flow.with_equations(|equations| {
-        let Sizes { laws, directions: n, .. } = equations.sizes();
+fn rates<F: OpenFlow>(flow: &F, at: &Element<F>, frozen: &FrozenPoint<F>) -> Option<Vec<f64>> {
+    let x = written::<F>(&at.x);
+    let (n, w) = flow.with_parts(at.time, |parts| {
+        let Sizes { laws, directions: n, .. } = parts.sizes();
         let (mut values, mut w) = (vec![0.0; laws], vec![0.0; laws * n]);
-        equations.differentials(at.time, x.as_ref(), &mut values, &mut w);
+        parts.differentials(at.time, &x, &mut values, &mut w);
         (n, w)
-    });
-    Some(flow.exchanged(at.time, &x, [&w[..n], &w[n..2 * n]])?.entries)
+    })?;
+    rates_with(flow, at.time, (&at.x, &x), [&w[..n], &w[n..2 * n]], frozen)
 }
 
 /// The errors of the entries of a ledger.
-fn ledger_errors<F: OpenFlow>(flow: &F, errors: &[f64]) -> Option<LedgerErrors> {
-    let nothing = Directions::zeros(flow.with_equations(|equations| equations.sizes().directions));
-    flow.ledger_errors(&flow.direction(&nothing, errors))
+fn ledger_errors<F: OpenFlow>(flow: &F, at: &Element<F>, errors: &[f64]) -> Option<LedgerErrors> {
+    flow.ledger_errors(&direction(flow, at, None, errors))
+}
+
+/// The displacement by these numbers of a point, or none of them, and by entries of the ledger at a clock that stands.
+fn direction<F: OpenFlow>(
+    flow: &F,
+    at: &Element<F>,
+    v: Option<&Directions>,
+    entries: &[f64],
+) -> Beside<F::Velocity> {
+    let mut beside = vec![0.0];
+    beside.extend(entries);
+    let zero = flow.at(at.time).sizes(&at.x).zero();
+    Beside { v: v.map_or_else(|| zero.clone(), |v| zero.with(|i| v[i])), beside }
 }
 
 /// The errors of what a step of the midpoint rule has booked: a third of the difference from the trapezoidal rule.
@@ -268,11 +476,13 @@ fn against_trapezoid<F: OpenFlow>(
     [x, end]: [&Element<F>; 2],
     h: f64,
 ) -> Option<LedgerErrors> {
-    let (first, last) = (rates(flow, x)?, rates(flow, end)?);
-    let booked = end.ledger.entries_since(&x.ledger);
+    let frozen = (x.x.clone(), 1.0);
+    let (first, last) = (rates(flow, x, &frozen)?, rates(flow, end, &frozen)?);
+    let mut booked = end.ledger.entries_since(&x.ledger);
+    booked[0] -= flow.frozen_work([x.time, end.time], &x.x);
     let rule = first.iter().zip(&last).map(|(first, last)| 0.5 * h * (first + last));
     let errors: Vec<f64> = booked.iter().zip(rule).map(|(sum, rule)| (sum - rule) / 3.0).collect();
-    ledger_errors(flow, &errors)
+    ledger_errors(flow, x, &errors)
 }
 
 impl<R, W> OpenSteps for Scheme<R, W>
@@ -291,8 +501,8 @@ where
     }
 
     fn serves<F: OpenFlow>(&self, flow: &F) -> Result<(), MethodError> {
-        let line = midpoint(self).line.ok_or(NoImplicitSteps::Scheme).map_err(MethodError::new)?;
-        flow.with_equations(|system| refuse(system, line.path)).map_err(MethodError::new)
+        let known = midpoint(self).line.ok_or(NoImplicitSteps::Scheme);
+        known.and_then(|line| serves(flow, line.path)).map_err(MethodError::new)
     }
 
     fn step<F: OpenFlow>(
@@ -342,15 +552,18 @@ fn ledger_defects<F: OpenFlow>(
     flow: &F,
     ends: [&Element<F>; 2],
     stages: &[DrivenStage],
+    frozen: &(Entries, f64),
 ) -> Option<[Vec<f64>; 2]> {
     let h = ends[1].time - ends[0].time;
+    let frozen = &(point::<F>(&frozen.0), frozen.1);
     let at_stage = |DrivenStage { time, x, w: [energy, entropy], .. }: &DrivenStage| {
-        Some(flow.exchanged(*time, x, [energy.numbers(), entropy.numbers()])?.entries)
+        let w = [energy.numbers(), entropy.numbers()];
+        rates_with(flow, *time, (&point::<F>(x), x), w, frozen)
     };
     let at_stages = stages.iter().map(at_stage).collect::<Option<Vec<_>>>()?;
     let defect = |node: f64, at: &Element<F>| {
         let coefficients = method.tableau.velocity(node);
-        let mut defect = rates(flow, at)?;
+        let mut defect = rates(flow, at, frozen)?;
         for (i, defect) in defect.iter_mut().enumerate() {
             let along = coefficients.iter().zip(&at_stages).map(|(c, rates)| c * rates[i]);
             *defect = h * (along.sum::<f64>() - *defect);
@@ -366,9 +579,9 @@ fn errors_of_stages<F: OpenFlow>(
     method: &Collocation,
     flow: &F,
     ends: [&Element<F>; 2],
-    stages: &[DrivenStage],
+    DrivenStep { stages, frozen, .. }: &DrivenStep,
 ) -> Option<LedgerErrors> {
-    let [first, second] = ledger_defects(method, flow, ends, stages)?;
+    let [first, second] = ledger_defects(method, flow, ends, stages, frozen)?;
     let [start, end] = ends.map(|x| x.ledger.entry_sizes());
     let power = f64::from(method.tableau.order + 1) / (method.tableau.stages as f64 + 1.0);
     let error = |i: usize| {
@@ -377,7 +590,7 @@ fn errors_of_stages<F: OpenFlow>(
         if defect < size { size * (defect / size).powf(power) } else { defect }
     };
     let errors: Vec<f64> = (0..first.len()).map(error).collect();
-    ledger_errors(flow, &errors)
+    ledger_errors(flow, ends[0], &errors)
 }
 
 /// A step with stages, with the errors of its entries.
@@ -388,8 +601,8 @@ fn of_stages<F: OpenFlow>(
     memory: &mut StageNumbers<AtRunTime>,
     fallbacks: Fallbacks,
 ) -> Result<Taken<F>, Failure> {
-    let (mut taken, DrivenStep { stages, .. }) = open_step(method, start, h, memory, fallbacks)?;
-    taken.evidence.ledger = errors_of_stages(method, start.flow, [start.x, &taken.x], &stages);
+    let (mut taken, step) = open_step(method, start, h, memory, fallbacks)?;
+    taken.evidence.ledger = errors_of_stages(method, start.flow, [start.x, &taken.x], &step);
     Ok(taken)
 }
 
@@ -398,10 +611,12 @@ fn damps<F: OpenFlow>(method: &Collocation, flow: &F) -> Result<(), MethodError>
     if !method.tableau.one_sided {
         return Ok(());
     }
-    let has_entropy =
-        flow.with_equations(|equations| equations.second_law() != SecondLaw::NoEntropy);
-    let baths = flow.bath_count();
-    if has_entropy || baths != 1 { Err(MethodError::new(NotDamped)) } else { Ok(()) }
+    let has_entropy = flow.at(0.0).entropy_law() != SecondLaw::NoEntropy;
+    if has_entropy || flow.empty().heats().count() != 1 {
+        Err(MethodError::new(NotDamped))
+    } else {
+        Ok(())
+    }
 }
 
 /// The error of a step with stages: the larger one of the defects at its ends.
@@ -411,12 +626,13 @@ fn error_of_stages<F: OpenFlow>(
     memory: &StageNumbers<AtRunTime>,
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
-    let (defects, stages) = driven((flow, x, h), None, |start| {
-        let defects = method.driven_defects(start, &flow.entries(&end.x), memory)?;
+    let (defects, (stages, frozen)) = driven((flow, x, h), false, None, |start| {
+        let defects = method.driven_defects(start, &written::<F>(&end.x), memory)?;
         Some((defects, method.driven_stages(start, memory)?))
     })?;
-    let of_ledger = ledger_defects(method, flow, [x, end], &stages)?;
-    let [first, second] = [0, 1].map(|i| norm(&flow.direction(&defects[i], &of_ledger[i])));
+    let of_ledger = ledger_defects(method, flow, [x, end], &stages, &frozen)?;
+    let [first, second] =
+        [0, 1].map(|i| norm(&direction(flow, x, Some(&defects[i]), &of_ledger[i])));
     Some(first.max(second))
 }
 
@@ -435,8 +651,9 @@ fn between_stages<F: OpenFlow>(
         return Some(step.end.clone());
     }
     let (flow, h) = (step.flow, theta * step.h);
-    let part =
-        driven((flow, step.x, h), None, |start| method.part_of_driven(start, memory, theta))?;
+    let part = driven((flow, step.x, h), false, None, |start| {
+        method.part_of_driven(start, memory, theta)
+    })?;
     let (y, _) = booked(flow, step.x, &part, h)?;
     let promises = promises(flow);
     let within = Within { tableau: method.tableau, step, theta };
@@ -467,8 +684,7 @@ macro_rules! of_stages {
             }
 
             fn serves<F: OpenFlow>(&self, flow: &F) -> Result<(), MethodError> {
-                flow.with_equations(|system| refuse(system, Path::Chart))
-                    .map_err(MethodError::new)?;
+                serves(flow, Path::Chart).map_err(MethodError::new)?;
                 damps(&Self::in_numbers(), flow)
             }
 

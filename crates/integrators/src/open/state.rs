@@ -3,11 +3,9 @@
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-use metriplectic_dynamics::exchange::{Entries, Names};
-use metriplectic_manifolds::Manifold;
-
 use crate::round_off::sum::plus;
 use crate::step::{EventExchange, Laws, LedgerErrors, LedgerSummary, StartError, StateSpace};
+use metriplectic_dynamics::exchange::{Entries, Names};
 
 /// The entries of a step: the work of the parameter, and those of ports and baths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,15 +121,16 @@ impl Ledger {
         Self::empty(&Arc::new(Columns::new(&names)))
     }
 
-    /// The ledger with one more step, with the work of each port, and the heat and the entropy of each bath in their order.
+    /// The ledger with one more step: the work of the time in the energy, then the work of each port, and the heat and the entropy of
+    /// each bath in their order.
     #[must_use]
     pub fn with_entries(&self, entries: &[f64]) -> Self {
-        self.plus(|index| if index == 0 { 0.0 } else { entries[index - 1] })
+        self.plus(|index| entries[index])
     }
 
-    /// The entries booked between another ledger and this one.
+    /// The entries booked between another ledger and this one, the work of the time first.
     pub fn entries_since(&self, other: &Self) -> Vec<f64> {
-        (1..self.sums.len()).map(|index| self.change(other, index)).collect()
+        (0..self.sums.len()).map(|index| self.change(other, index)).collect()
     }
 
     /// The ledger with one more event.
@@ -188,15 +187,25 @@ impl Ledger {
         Booked { parameter: size(0), entries: E::from_index(|i| size(i + 1)) }
     }
 
-    /// The sizes of the entries of ports and baths.
-    pub fn entry_sizes(&self) -> Vec<f64> {
-        self.sums[1..].iter().map(|[sum, _]| sum.abs()).collect()
+    /// The index of the heat of each bath among the entries of ports and baths; that of its entropy follows.
+    pub fn heats(&self) -> impl Iterator<Item = usize> {
+        self.columns.heats()
     }
 
-    /// Sorts errors of the entries of ports and baths, and takes the largest of each kind.
+    /// Returns whether there are entries of ports or baths.
+    pub fn has_entries(&self) -> bool {
+        self.len() > 0
+    }
+
+    /// The sizes of the entries, that of the work of the time first.
+    pub fn entry_sizes(&self) -> Vec<f64> {
+        self.sums.iter().map(|[sum, _]| sum.abs()).collect()
+    }
+
+    /// Sorts errors of the entries, that of the work of the time first, and takes the largest of each kind.
     pub fn errors_by_kind(&self, errors: &[f64]) -> LedgerErrors {
-        let [work, heat, entropy] = self.columns.largest(|i| errors[i]);
-        LedgerErrors::new(work, heat, entropy)
+        let [work, heat, entropy] = self.columns.largest(|i| errors[i + 1]);
+        LedgerErrors::new(work.max(errors[0].abs()), heat, entropy)
     }
 
     /// Returns the entries that were booked between another ledger and this one.
@@ -371,7 +380,7 @@ impl<P> OpenState<P> {
     }
 }
 
-/// The states of an open system: points of `M` with the time and a ledger.
+/// The states of an open system: points of the space `M` with the time and a ledger.
 #[derive(Debug)]
 pub struct OpenSpace<M>(PhantomData<fn() -> M>);
 
@@ -387,13 +396,13 @@ impl<M> PartialEq for OpenSpace<M> {
     }
 }
 
-impl<M: Manifold> StateSpace for OpenSpace<M> {
-    type Element = OpenState<M::Point<f64>>;
+impl<M: StateSpace> StateSpace for OpenSpace<M> {
+    type Element = OpenState<M::Element>;
 
     /// The entries of the point, the time, and each sum of the ledger with its last digits: all work and heat, the work
     /// of the parameter, the columns of the ports and baths in their order, and the work, the heat and the entropy of events.
     fn numbers(x: &Self::Element) -> Vec<f64> {
-        let mut numbers = M::entries(&x.x);
+        let mut numbers = M::numbers(&x.x);
         numbers.push(x.time);
         numbers.extend(x.ledger.numbers());
         numbers

@@ -15,7 +15,7 @@ use crate::step::{CountOf, Flow as _, StepError};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
 /// A factor of four fails `open/verify.rs::a_port_that_carries_a_part_of_an_entropy_is_refused`.
-const BROKEN: f64 = 1e-8;
+pub(super) const BROKEN: f64 = 1e-8;
 
 struct Judge<'a, Y: Metriplectic, P> {
     w: &'a CovectorsOf<Y>,
@@ -202,51 +202,15 @@ where
         judge.verdict.map(|()| judge.slopes)
     }
 
-    /// Compares the derivative of the energy along time with its values. Nothing is known of the times of a model, so the
-    /// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
+    /// [Compares](compare_with_values) the derivative of the energy along time with its values.
     pub(super) fn check_clock(&self, state: &StateOf<Y>) -> Result<(), ModelError> {
         if !C::RUNS {
             return Ok(());
         }
         let (t, x) = (state.time, &state.x);
-        let derivative = self.power(t, x);
-        let point = || Y::Manifold::entries(x);
-        if !derivative.is_finite() {
-            return Err(ModelError::DerivativeNotFinite {
-                field: "energy along time",
-                point: point(),
-            });
-        }
-        let mut agreeing = 0;
-        let mut before = f64::NAN;
-        for exponent in -200..200 {
-            let delta = 2_f64.powi(exponent);
-            // Forward, because the law of motion may have changed at this time.
-            let later = t + delta;
-            let change = self.energy(later, x) - self.energy(t, x);
-            let quotient = change / (later - t);
-            // A sum of large terms that cancel, as in the bottom of a stiff well, has the round-off of its terms.
-            let terms = |t| size_of_terms::<Y::Manifold>(self.frozen(t).energy(), x);
-            let size = f64::EPSILON * (terms(t) + terms(later));
-            // Behind a pulse all quotients are zero.
-            let clear = change.abs() > CLEAR * (size + NO_DIGITS) && quotient.abs() > NO_DIGITS;
-            let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
-            agreeing = if agrees { agreeing + 1 } else { 0 };
-            before = if clear { quotient } else { f64::NAN };
-            if agreeing == AGREEING {
-                if (derivative - quotient).abs() > 1e2 * SAME * quotient.abs() {
-                    let time = t;
-                    return Err(ModelError::LostTimeDerivative {
-                        time,
-                        point: point(),
-                        derivative,
-                        quotient,
-                    });
-                }
-                return Ok(());
-            }
-        }
-        Ok(())
+        let terms = |t| size_of_terms::<Y::Manifold>(self.frozen(t).energy(), x);
+        let values = |t| self.energy(t, x);
+        compare_with_values(t, self.power(t, x), values, terms, || Y::Manifold::entries(x))
     }
 
     /// Looks for a jump of the energy in time inside a step of a fixed size. Steps that follow a tolerance become small there.
@@ -254,21 +218,78 @@ where
         if !C::RUNS {
             return Ok(());
         }
-        let (ends, point) = ([x, end], &end.x);
-        let [t, end] = [x.time, end.time];
-        let energies = [t, end].map(|t| self.energy(t, point));
-        let frozen = energies[1] - energies[0];
-        let half = 0.5 * (end - t);
-        let quadrature: f64 = GAUSS
-            .iter()
-            .map(|(node, weight)| 2.0 * half * weight * self.power(t + half * (1.0 + node), point))
-            .sum();
-        let terms = self.energy_sizes(ends)[0] + frozen.abs();
-        if (frozen - quadrature).abs() > JUMP * terms + NO_DIGITS {
-            return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
-        }
-        Ok(())
+        let (ends, point, times) = ([x, end], &end.x, [x.time, end.time]);
+        let frozen = self.frozen_work(times, point);
+        protocol(times, frozen, |t| self.power(t, point), || self.energy_sizes(ends)[0])
     }
+}
+
+/// Compares the derivative of an energy along time at the time `t` with its values. Nothing is known of the times of a model, so the
+/// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
+///
+/// `terms` is the size of the terms of the energy, and `point` the state, for messages.
+///
+/// # Errors
+///
+/// [`ModelError::DerivativeNotFinite`] and [`ModelError::LostTimeDerivative`].
+pub fn compare_with_values(
+    t: f64,
+    derivative: f64,
+    energy: impl Fn(f64) -> f64,
+    terms: impl Fn(f64) -> f64,
+    point: impl Fn() -> Vec<f64>,
+) -> Result<(), ModelError> {
+    if !derivative.is_finite() {
+        return Err(ModelError::DerivativeNotFinite { field: "energy along time", point: point() });
+    }
+    let (mut agreeing, mut before) = (0, f64::NAN);
+    let (here, size_here) = (energy(t), terms(t));
+    for exponent in -200..200 {
+        // Forward, because the law of motion may have changed at this time.
+        let later = t + 2_f64.powi(exponent);
+        if later.to_bits() == t.to_bits() {
+            continue;
+        }
+        let change = energy(later) - here;
+        let quotient = change / (later - t);
+        // A sum of large terms that cancel, as in the bottom of a stiff well, has the round-off of its terms.
+        let size = f64::EPSILON * (size_here + terms(later));
+        // Behind a pulse all quotients are zero.
+        let clear = change.abs() > CLEAR * (size + NO_DIGITS) && quotient.abs() > NO_DIGITS;
+        let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
+        agreeing = if agrees { agreeing + 1 } else { 0 };
+        before = if clear { quotient } else { f64::NAN };
+        if agreeing == AGREEING {
+            if (derivative - quotient).abs() > 1e2 * SAME * quotient.abs() {
+                let (time, point) = (t, point());
+                return Err(ModelError::LostTimeDerivative { time, point, derivative, quotient });
+            }
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// Compares the frozen work of a step with the quadrature of its rate, beside the terms of the energy at both ends.
+///
+/// # Errors
+///
+/// [`StepError::ProtocolJumps`].
+pub(super) fn protocol(
+    [t, end]: [f64; 2],
+    frozen: f64,
+    power: impl Fn(f64) -> f64,
+    terms: impl FnOnce() -> f64,
+) -> Result<(), StepError> {
+    let half = 0.5 * (end - t);
+    let quadrature: f64 = GAUSS
+        .iter()
+        .map(|(node, weight)| 2.0 * half * weight * power(t + half * (1.0 + node)))
+        .sum();
+    if (frozen - quadrature).abs() > JUMP * (terms() + frozen.abs()) + NO_DIGITS {
+        return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
+    }
+    Ok(())
 }
 
 #[cfg(test)]

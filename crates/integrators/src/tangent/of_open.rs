@@ -3,7 +3,6 @@
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_fields::{Column as _, Jet1, Real, ScalarField, Space, Vector};
-use metriplectic_manifolds::Manifold;
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::LawRows;
@@ -127,7 +126,7 @@ impl<P, F: Flow<Space: StateSpace<Element = OpenState<P>>>> TangentState<F> {
     }
 }
 
-impl<M: Manifold, F: Flow<Space = OpenSpace<M>>> TangentState<F> {
+impl<M: StateSpace, F: Flow<Space = OpenSpace<M>>> TangentState<F> {
     /// The derivative of the work `W_t` of the time in the energy. The column of the clock is that of a start whose clock moves at a fixed
     /// point, where `∂_t H` is work already, and so at the end: it is `dW_t/dt₀ + ∂_t H(x₀) − ∂_t H(x)`.
     pub fn parameter_work_along(&self) -> DVector<f64> {

@@ -1,236 +1,149 @@
 //! An open lattice as a flow.
 
-use metriplectic_dynamics::invariants::Kind;
-use metriplectic_dynamics::{ModelError, SecondLaw};
-use metriplectic_integrators::explicit::{Combination, StageFlow as _, Target};
-use metriplectic_integrators::open::{Ledger, OpenState};
-use metriplectic_integrators::{
-    Entries, EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Listed, Recheck,
-    Scales, StartError, StateSpace as _, StepError, Vector as _,
-};
-use metriplectic_manifolds::PointError;
+use metriplectic_dynamics::ModelError;
+use metriplectic_equations::{Apart, Path};
+use metriplectic_fields::{Column as _, Real, ScalarField, Space as _};
+use metriplectic_integrators::open::{Exchanged, Ledger, OpenFlow, compare_with_values, open_flow};
+use metriplectic_integrators::{Flow as _, FlowError, NoImplicitSteps};
+use metriplectic_manifolds::Manifold;
 
-use super::parts::per_energy;
-use super::vector::OpenSiteVector;
-use super::{OpenLattice, OpenSites, StateOf};
-use crate::flow::{against_simpson, listed};
-use crate::model::Model;
+use super::in_time::AtTime;
+use super::parts::Exchanged as OfParts;
+use super::{OpenLattice, StateOf};
+use crate::dense::Dense;
+use crate::flow::LatticeJets;
+use crate::lattice::Lattice;
+use crate::model::{Model, VectorOf};
+use crate::points::{Points, Sites};
+use crate::vector::SiteVector;
 
-/// The fraction of the energy to which the errors of work and heat are relative as long as less has flowed.
-const LITTLE: f64 = 1e-3;
+/// How many sites have the rate of their energy in time compared with its values.
+const COMPARED: usize = 16;
 
-impl<P: Model> Listed for OpenLattice<P> {
-    /// A ledger without entries.
-    type Layout = Ledger;
+impl<P: Model> OpenFlow for OpenLattice<P> {
+    type Points = Sites<P::Manifold>;
+    type Velocity = SiteVector;
+    type Gradients = LatticeJets<VectorOf<P>>;
+    type Closed<'a>
+        = Lattice<AtTime<'a, P>>
+    where
+        Self: 'a;
 
-    fn layout(&self) -> &Ledger {
+    fn at(&self, t: f64) -> Lattice<AtTime<'_, P>> {
+        self.at(t)
+    }
+
+    fn with_parts<T>(&self, t: f64, f: impl FnOnce(&dyn Apart) -> T) -> Option<T> {
+        Some(f(&Dense(&self.at(t))))
+    }
+
+    fn serve_points(&self, _: Path) -> Result<(), NoImplicitSteps> {
+        Ok(())
+    }
+
+    fn empty(&self) -> &Ledger {
         &self.empty
     }
 
-    fn read(empty: &Ledger, entries: &[f64]) -> StateOf<P> {
-        let (points, rest) = entries.split_at(entries.len() - 1 - empty.numbers().len());
-        OpenState { x: listed(points), time: rest[0], ledger: empty.with_numbers(&rest[1..]) }
+    fn has_clock(&self) -> bool {
+        !self.fields.is_empty()
     }
 
-    fn at_start(&self, entries: &[f64]) -> Result<StateOf<P>, PointError> {
-        match self.lattice.element(entries) {
-            Err(PointError::Length { .. }) => self.element(entries),
-            points => points.map(|x| self.start(x)),
-        }
+    fn power(&self, t: f64, x: &Points<P::Manifold>) -> f64 {
+        self.sum_in_time(x, |field, site, x| field(Real::new(t, 1.0, 0.0, 0.0), site, x).eps1)
     }
 
-    fn led(x: &StateOf<P>, y: StateOf<P>) -> StateOf<P> {
-        x.at(y.x)
+    /// The work of the energies that depend on time alone, so that it has the digits of these.
+    fn frozen_work(&self, [t, end]: [f64; 2], x: &Points<P::Manifold>) -> f64 {
+        let [t, end] = [t, end].map(Real::from);
+        self.sum_in_time(x, |field, site, x| field(end, site, x).re - field(t, site, x).re)
     }
 
-    fn write(x: &StateOf<P>) -> Entries {
-        OpenSites::<P::Manifold>::numbers(x).into()
-    }
-}
-
-impl<P: Model> Flow for OpenLattice<P> {
-    type Space = OpenSites<P::Manifold>;
-    type Numbers = Vec<f64>;
-    type Vector = OpenSiteVector;
-
-    fn laws(&self, x: &StateOf<P>) -> Laws<Vec<f64>> {
-        x.ledger.balanced(self.lattice.laws(&x.x))
-    }
-
-    fn term_sizes(&self, x: &StateOf<P>) -> Laws<Vec<f64>> {
-        let sizes = self.lattice.term_sizes(&x.x);
-        let energy = sizes.energy + x.ledger.net().abs();
-        Laws { energy, entropy: sizes.entropy + x.ledger.entropy_of_baths().abs(), ..sizes }
-    }
-
-    fn entropy_round_off(&self, ends: [&StateOf<P>; 2]) -> f64 {
-        let of_baths = ends.map(|x| x.ledger.entropy_of_baths().abs());
-        self.lattice.entropy_round_off(ends.map(|x| &x.x))
-            + 4.0 * f64::EPSILON * of_baths[0].max(of_baths[1])
-    }
-
-    fn energy_sizes(&self, ends: [&StateOf<P>; 2]) -> [f64; 2] {
-        // What flows in may find a state without energy.
-        let flowed = ends[1].ledger.flowed(&ends[0].ledger);
-        ends.map(|x| self.term_sizes(x).energy + flowed)
-    }
-
-    fn rates(&self, x: &StateOf<P>, d: &OpenSiteVector) -> Option<OpenSiteVector> {
-        let y = self.stage(x, d)?;
-        let (v, _) = self.motion(&y)?;
-        Some(self.stage_rates(x, (d, &y), &v))
-    }
-
-    fn sizes(&self, x: &StateOf<P>) -> OpenSiteVector {
-        let mut beside = vec![0.0];
-        beside.extend(x.ledger.entry_sizes());
-        OpenSiteVector::new(self.lattice.sizes(&x.x), beside)
-    }
-
-    fn moved(&self, x: &StateOf<P>, d: &OpenSiteVector) -> StateOf<P> {
-        self.advanced(x, &d.beside, self.lattice.moved(&x.x, &d.v))
-    }
-
-    fn displacement(&self, x: &StateOf<P>, y: &StateOf<P>) -> Option<OpenSiteVector> {
-        let v = self.lattice.displacement(&x.x, &y.x)?;
-        Some(OpenSiteVector::new(v, self.beside(x, y)))
-    }
-
-    fn production(&self, x: &StateOf<P>) -> Option<f64> {
-        Some(self.motion(x)?.1)
-    }
-
-    fn onto(
+    fn velocity_of(
         &self,
-        y: &StateOf<P>,
-        laws: &Laws<Vec<f64>>,
-        entropy: Option<f64>,
-    ) -> Option<StateOf<P>> {
-        let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
-        let (error, _) = self.motion(y)?;
-        let with_entropy = entropy.is_some();
-        let error = Some(Combination { factor: 1.0, terms: &[(1.0, &error)] });
-        let target = Target { laws: &laws, with_entropy, limit: None, units: None, error };
-        self.project(y.clone(), &target).ok().map(|end| end.x)
+        t: f64,
+        x: &Points<P::Manifold>,
+        gradients: Option<&LatticeJets<VectorOf<P>>>,
+    ) -> Option<(SiteVector, Exchanged)> {
+        let lattice = self.at(t);
+        let formed = gradients.is_none().then(|| lattice.differentials::<false>(x).0);
+        let all = gradients.map_or(formed.as_ref(), |jets| Some(&jets.all))?;
+        let (mut v, internal) = lattice.motion_along::<true>(x, all)?;
+        let OfParts { velocities, entries, production, .. } = self.exchanged(t, x, all);
+        for (site, more) in velocities {
+            v.add_at(site, &more);
+        }
+        Some((v, Exchanged { entries, production: internal + production }))
     }
 
-    fn element(&self, entries: &[f64]) -> Result<StateOf<P>, PointError> {
-        let beside = 1 + self.empty.numbers().len();
-        let Some(length) = entries.len().checked_sub(beside) else {
-            return Err(PointError::Length { found: entries.len(), expected: beside });
-        };
-        let (points, rest) = entries.split_at(length);
-        let x = self.lattice.element(points)?;
-        Ok(OpenState { x, time: rest[0], ledger: self.empty.with_numbers(&rest[1..]) })
-    }
-
-    fn begin(&self, x: StateOf<P>, time: f64) -> Result<StateOf<P>, StartError> {
-        x.begun(time, &self.empty)
-    }
-
-    fn clocked(&self, x: &StateOf<P>, time: f64) -> Option<StateOf<P>> {
-        // The energy of a lattice does not depend on time, so no work is done by the clock.
-        (x.time.to_bits() != time.to_bits()).then(|| OpenState { time, ..x.clone() })
-    }
-
-    fn jumped(&self, x: &StateOf<P>, y: StateOf<P>) -> StateOf<P> {
-        x.at(y.x)
-    }
-
-    fn with_event(&self, x: &StateOf<P>, event: &EventExchange) -> Option<StateOf<P>> {
-        Some(OpenState { ledger: x.ledger.with_event(event), ..x.clone() })
-    }
-
-    fn depends_on_time(&self) -> bool {
-        true
-    }
-
-    fn ledger(&self, x: &StateOf<P>) -> Option<LedgerSummary> {
-        Some(x.ledger.summarised(None, self.entropy_at(x)))
-    }
-
-    fn has_ledger(&self) -> bool {
-        true
-    }
-
-    fn ledger_errors(&self, errors: &OpenSiteVector) -> Option<LedgerErrors> {
-        Some(self.empty.errors_by_kind(&errors.beside[1..]))
-    }
-
-    fn with_ledger_sizes(
+    fn exchanged(
         &self,
-        x: &StateOf<P>,
-        mut scales: Scales<OpenSiteVector>,
-    ) -> Scales<OpenSiteVector> {
-        let energy = LITTLE * self.lattice.term_sizes(&x.x).energy;
-        let mut known = vec![0.0];
-        for part in &self.parts {
-            known.push(energy);
-            known.extend(part.temperature(x.time).map(|t| energy * per_energy(t)));
+        t: f64,
+        x: &[f64],
+        w: [&[f64]; 2],
+        force: Option<&mut [f64]>,
+    ) -> Option<Exchanged> {
+        if self.temperatures(t).iter().any(|temperature| *temperature < 0.0) {
+            return None;
         }
-        for (size, known) in scales.sizes.beside.iter_mut().zip(known) {
-            *size = size.max(known);
+        let OfParts { velocities, entries, production, .. } = self.exchanged_in_a_step(t, x, w);
+        if let Some(force) = force {
+            self.add_to(force, &velocities);
         }
-        scales
+        let is_finite = production.is_finite() && entries.iter().all(|rate| rate.is_finite());
+        is_finite.then_some(Exchanged { entries, production })
     }
 
-    fn inspect(&self, ends: [&StateOf<P>; 2], _: bool) -> Result<(), StepError> {
-        let time = ends[1].time;
-        self.look_at_parts(ends[1]).map_err(|law| StepError::Model { time, law: Box::new(law) })
+    fn temperatures(&self, t: f64) -> Vec<f64> {
+        self.parts.iter().filter_map(|part| part.temperature(t)).collect()
     }
 
-    fn entropy_law(&self) -> SecondLaw {
-        let baths = || self.parts.iter().filter(|part| part.is_bath());
-        match self.lattice.entropy_law() {
-            _ if baths().any(|part| part.is_cold()) => SecondLaw::Published,
-            SecondLaw::NoEntropy if baths().next().is_some() => SecondLaw::Exact,
-            law => law,
-        }
+    fn has_cold_bath(&self) -> bool {
+        self.parts.iter().any(|part| part.is_bath() && part.is_cold())
     }
 
-    fn kinds(&self) -> Vec<Kind> {
-        self.lattice.kinds()
-    }
-
-    fn check(&self, x0: &StateOf<P>) -> Result<(), ModelError> {
-        self.look_at_parts(x0)
-    }
-
-    fn examine(&self, x0: &StateOf<P>) -> Result<(), FlowError> {
-        self.lattice.examine_start(&x0.x, self.is_verified())
-    }
-
-    fn is_verified(&self) -> bool {
+    fn was_verified(&self) -> bool {
         self.verified || self.lattice.is_verified()
     }
 
-    fn rechecks(&self, occasion: Recheck) -> bool {
-        self.lattice.rechecks(occasion)
+    fn check_points(&self, _: &StateOf<P>) -> Result<(), ModelError> {
+        Ok(())
     }
 
-    fn reexamine(&self, x: &StateOf<P>, occasion: Recheck) -> Result<(), FlowError> {
-        self.lattice.reexamine(&x.x, occasion)
+    fn examine_points(&self, x0: &StateOf<P>) -> Result<(), FlowError> {
+        self.at(x0.time).examine_start(&x0.x, self.was_verified())
     }
 
-    fn site_outside(&self, x: &StateOf<P>, d: &OpenSiteVector) -> Option<usize> {
-        self.lattice.site_outside(&x.x, &d.v)
+    fn check_exchange(&self, x: &StateOf<P>) -> Result<(), ModelError> {
+        self.look_at_parts(x)
     }
 
-    fn defect(&self, x: &StateOf<P>) -> f64 {
-        self.lattice.defect(&x.x)
+    /// At sites that are spread over the lattice.
+    fn check_clock(&self, state: &StateOf<P>) -> Result<(), ModelError> {
+        if state.x.len() != self.lattice.sites() {
+            return Ok(());
+        }
+        let stride = self.lattice.sites().div_ceil(COMPARED).max(1);
+        for site in (0..self.lattice.sites()).step_by(stride) {
+            let (x, scales) = (&state.x[site], P::Manifold::scales(&state.x[site]));
+            for field in &self.fields {
+                let at = |t: Real| field(t, site, &P::Manifold::constant(x));
+                let terms = |t: f64| {
+                    let energy = |x: &_| field(Real::from(t), site, x);
+                    let jet = ScalarField::<P::Manifold>::jet1(&energy, x);
+                    jet.value.abs() + jet.df.abs().dot(&scales)
+                };
+                let rate = at(Real::new(state.time, 1.0, 0.0, 0.0)).eps1;
+                let values = |t: f64| at(Real::from(t)).re;
+                let point = || P::Manifold::entries(x);
+                compare_with_values(state.time, rate, values, terms, point)?;
+            }
+        }
+        Ok(())
     }
+}
 
-    fn velocity_terms(
-        &self,
-        x: &StateOf<P>,
-        v: &OpenSiteVector,
-        sizes: &OpenSiteVector,
-    ) -> Option<OpenSiteVector> {
-        let terms = self.lattice.velocity_terms(&x.x, &v.v, &sizes.v)?;
-        Some(OpenSiteVector::new(terms, v.zero().beside))
-    }
-
-    fn local_error(&self, x: &StateOf<P>, end: &StateOf<P>, h: f64) -> Option<OpenSiteVector> {
-        against_simpson(self, x, end, h)
-    }
+open_flow! {
+    [P: Model] OpenLattice<P>: Lattice<P>,
+    weighs errors: true, catches panics: false
 }

@@ -8,15 +8,15 @@ use std::sync::Arc;
 
 use metriplectic_dynamics::exchange::Temperature;
 use metriplectic_dynamics::noise::{Boltzmann, Uniform};
-use metriplectic_fields::Column;
+use metriplectic_fields::{Column, Real, Space};
 use metriplectic_integrators::noise::{Drawn, Fluctuating, Landing, Noise};
-use metriplectic_integrators::open::OpenState;
+use metriplectic_integrators::open::surrounded::per_energy;
+use metriplectic_integrators::open::{OpenFlow, OpenState};
 use metriplectic_integrators::{Flow as _, FlowError, Judged, NoiseError, Noisy, Vector as _};
 use metriplectic_manifolds::Flat;
 
 use super::parts::{Part, PartKind};
-use super::vector::OpenSiteVector;
-use super::{OpenLattice, StateOf};
+use super::{OpenLattice, OpenSiteVector, StateOf};
 use crate::error::LatticeError;
 use crate::gather::Gather as _;
 use crate::lattice::{Lattice, differentials_at, halves};
@@ -70,6 +70,17 @@ impl<P: Model<Manifold: Flat>> OpenLattice<P> {
 pub trait NoisySurroundings<P: Model>: Sized {
     /// The lattice with surroundings, which have no part yet unless it has some.
     fn opened(self) -> Noisy<OpenLattice<P>, Uniform>;
+
+    /// Adds an [energy that depends on time](OpenLattice::energy_in_time).
+    fn energy_in_time(
+        self,
+        energy: impl Fn(Real, usize, &<P::Manifold as Space>::Point<Real>) -> Real
+        + Send
+        + Sync
+        + 'static,
+    ) -> Noisy<OpenLattice<P>, Uniform> {
+        self.opened().map(|lattice| lattice.energy_in_time(energy))
+    }
 
     /// Appends a [port](OpenLattice::work).
     fn work(
@@ -193,7 +204,7 @@ impl<P: Model> OpenLattice<P> {
     fn of_sites(&self, v: SiteVector) -> Option<OpenSiteVector> {
         let mut beside = vec![0.0];
         beside.extend(self.empty.entry_sizes());
-        let v = OpenSiteVector::new(v, beside);
+        let v = OpenSiteVector { v, beside };
         (0..v.len()).all(|i| v.get(i).is_finite()).then_some(v)
     }
 
@@ -217,7 +228,7 @@ impl<P: Model> OpenLattice<P> {
         bath: &Bath<'_, P>,
         (terms, (strength, numbers)): (Range<usize>, Drawn<'_>),
     ) -> SiteVector {
-        let (all, _) = self.lattice.differentials::<false>(&x.x);
+        let (all, _) = self.at(x.time).differentials::<false>(&x.x);
         let strength = strength * bath.part.temperature(x.time).unwrap_or(0.0);
         self.summed(bath, |k, site| {
             let (mut sum, mut r) = (VectorOf::<P>::zero(), bath.first + k * bath.count);
@@ -234,8 +245,9 @@ impl<P: Model> OpenLattice<P> {
 
     /// Computes `T Σ c_r b_r` of a bath.
     fn bath_drift(&self, x: &StateOf<P>, bath: &Bath<'_, P>) -> SiteVector {
-        let sizes = self.lattice.sizes_of_differences(&x.x);
-        let around = Around::of(&self.lattice, &x.x);
+        let lattice = self.at(x.time);
+        let sizes = lattice.sizes_of_differences(&x.x);
+        let around = Around::of(&lattice, &x.x);
         let temperature = bath.part.temperature(x.time).unwrap_or(0.0);
         self.summed(bath, |_, site| {
             let terms = |[y, _]: [&PointOf<P>; 2]| {
@@ -269,7 +281,7 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for OpenLattice<P> {
         let v = match baths.iter().find(|bath| bath.terms().contains(&terms.start)) {
             Some(bath) => self.bath_noise(x, bath, (terms, drawn)),
             None if self.own_terms() == 0 => self.lattice.vector_of(|_| VectorOf::<P>::zero()),
-            None => self.lattice.noise(&x.x, terms, drawn)?,
+            None => self.at(x.time).noise(&x.x, terms, drawn)?,
         };
         self.of_sites(v)
     }
@@ -281,15 +293,15 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for OpenLattice<P> {
         noise: &Noise<Uniform>,
     ) -> Option<OpenSiteVector> {
         let v = match group.checked_sub(1) {
-            None => self.lattice.drift(&x.x, 0, noise)?,
+            None => self.at(x.time).drift(&x.x, 0, noise)?,
             Some(bath) => self.bath_drift(x, self.all_baths().get(bath)?),
         };
         self.of_sites(v)
     }
 
     fn friction(&self, x: &StateOf<P>) -> Option<OpenSiteVector> {
-        let (all, _) = self.lattice.differentials::<false>(&x.x);
-        let (mut v, _) = self.lattice.motion_along::<false>(&x.x, &all)?;
+        let (all, _) = self.at(x.time).differentials::<false>(&x.x);
+        let (mut v, _) = self.at(x.time).motion_along::<false>(&x.x, &all)?;
         for part in self.parts.iter().filter(|part| part.is_bath()) {
             let temperature = part.temperature(x.time).unwrap_or(0.0);
             for &site in &part.sites {
@@ -315,23 +327,22 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for OpenLattice<P> {
         if !heat.is_finite() {
             return None;
         }
-        let (column, temperature) =
-            *metriplectic_integrators::open::OpenFlow::baths(self, time).get(bath)?;
+        let (column, temperature) = *self.baths(time).get(bath)?;
         let mut entries = vec![0.0; self.empty.entry_sizes().len()];
-        entries[column] = heat;
-        entries[column + 1] = -heat * super::parts::per_energy(temperature);
+        entries[column + 1] = heat;
+        entries[column + 2] = -heat * per_energy(temperature);
         Some(OpenState { x: to.x, time, ledger: ledger.with_entries(&entries) })
     }
 
     fn examine_start_alone(&self, x0: &StateOf<P>) -> Result<(), FlowError> {
-        self.lattice.examine_start(&x0.x, true)
+        self.at(x0.time).examine_start(&x0.x, true)
     }
 
     fn examine_noise(&self, x: &StateOf<P>, noise: &Noise<Uniform>) -> Result<(), NoiseError> {
         let baths = self.all_baths();
         if self.own_terms() > 0 {
             // Its own friction is that of a lattice without surroundings.
-            self.lattice.examine_noise(&x.x, noise)?;
+            self.at(x.time).examine_noise(&x.x, noise)?;
         }
         if P::EnergyGather::PRESENT || P::EntropyGather::PRESENT {
             return Err(NoiseError::BondsHaveEnergies);
@@ -342,9 +353,10 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for OpenLattice<P> {
         if self.own_terms() > 0 {
             return Ok(());
         }
-        self.lattice.start_and_near(&x.x).iter().try_for_each(|x| {
-            let around = Around::of(&self.lattice, x);
-            self.lattice.keep_volume(x, |site, y| around.energy(site, y))
+        let lattice = self.at(x.time);
+        lattice.start_and_near(&x.x).iter().try_for_each(|x| {
+            let around = Around::of(&lattice, x);
+            lattice.keep_volume(x, |site, y| around.energy(site, y))
         })
     }
 }
@@ -358,7 +370,7 @@ impl<P: Model> Judged for OpenLattice<P> {
     }
 
     fn verify_model(&self, x: &StateOf<P>, radius: f64) -> Result<(), LatticeError> {
-        self.lattice.judge(&x.x, radius, &mut Laws::first())?;
+        self.at(x.time).judge(&x.x, radius, &mut Laws::first())?;
         self.verify_parts(x)
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use metriplectic_dynamics::exchange::Temperature;
 use metriplectic_fields::Column;
+use metriplectic_integrators::open::surrounded::per_energy;
 
 use super::OpenLattice;
 use crate::double::Double;
@@ -95,11 +96,6 @@ impl<P: Model> Part<P> {
             }
         }
     }
-}
-
-/// The entropy of heat: a bath at zero takes none.
-pub(super) fn per_energy(temperature: f64) -> f64 {
-    if temperature > 0.0 { temperature.recip() } else { 0.0 }
 }
 
 impl<P: Model> OpenLattice<P> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use metriplectic_dynamics::ModelError;
 use metriplectic_fields::Column;
+use metriplectic_integrators::open::OpenFlow as _;
 use metriplectic_manifolds::Manifold;
 
 use super::parts::{AtSite, Part};
@@ -55,14 +56,14 @@ impl<P: Model> OpenLattice<P> {
     ///
     /// The first [`LatticeError`]: that of a site or a bond, or [`LatticeError::Surroundings`] with the port or the bath.
     pub fn verify(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
-        self.lattice.verify(&x0.x)?;
+        self.at(x0.time).verify(&x0.x)?;
         self.verify_parts(x0)
     }
 
     /// Lists every law that [`verify`](Self::verify) tries, with the site or the bond where it is worst, and the port or the
     /// bath. Read it when a new lattice misbehaves.
     pub fn report(&self, x0: &StateOf<P>) -> LatticeReport {
-        let report = self.lattice.report(&x0.x);
+        let report = self.at(x0.time).report(&x0.x);
         let mut laws = Laws::of(report.laws);
         // The ports and baths have no state to be tried at, unless the lattice has.
         let verdict = match report.verdict {
@@ -89,7 +90,8 @@ impl<P: Model> OpenLattice<P> {
     }
 
     pub(super) fn verify_parts(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
-        self.look_at_parts(x0).map_err(|law| LatticeError::Surroundings(Box::new(law)))
+        let looked_at = self.check_clock(x0).and_then(|()| self.look_at_parts(x0));
+        looked_at.map_err(|law| LatticeError::Surroundings(Box::new(law)))
     }
 
     /// Checks at a state that sites exist, that ports carry no entropy, that ports and baths keep the conserved sums, that no
@@ -108,7 +110,7 @@ impl<P: Model> OpenLattice<P> {
         if self.parts.is_empty() || state.x.len() != self.lattice.sites() {
             return Ok(());
         }
-        let (all, _) = self.lattice.differentials::<false>(&state.x);
+        let (all, _) = self.at(state.time).differentials::<false>(&state.x);
         self.parts.iter().try_for_each(|part| self.judge_part(part, state, &all, laws))
     }
 

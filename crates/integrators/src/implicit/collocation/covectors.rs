@@ -5,6 +5,7 @@ use metriplectic_equations::{ENERGY, ENTROPY};
 use metriplectic_fields::power_of_two;
 
 use super::chart::StepChart;
+use super::clock::Timed;
 use crate::collocation::Stages;
 use crate::collocation::covectors::{Correction, LawStart};
 use crate::collocation::tableau::{Numbers, STAGES, Tableau};
@@ -207,11 +208,12 @@ pub(super) struct LawOfStages<V> {
 }
 
 impl<L: Lengths> StageCovectors<L> {
-    /// The covectors of laws with these starts, corrected in these ways.
+    /// The covectors of laws with these starts, corrected in these ways; of an energy that depends on time, if it does.
     #[inline]
     pub(super) fn of(
         stages: &StagePoints<L>,
         polynomial: &StepPolynomial<'_, L>,
+        timed: Option<Timed<'_, L>>,
         start: impl Fn(usize) -> LawStart,
         correction: impl Fn(usize) -> Correction,
     ) -> Self {
@@ -222,6 +224,10 @@ impl<L: Lengths> StageCovectors<L> {
                 return OfLaws { energy: parts.zero(), entropy: parts.zero(), invariants: vec![] };
             }
             parts.each_law(|law| {
+                let parts = match &timed {
+                    Some(timed) if law == ENERGY => &timed.in_time[i],
+                    _ => parts,
+                };
                 let (value, df) = parts.jet(law, &stages.x[i]);
                 if law == ENERGY {
                     energies[i] = value;
@@ -232,7 +238,7 @@ impl<L: Lengths> StageCovectors<L> {
         let before = start(ENERGY).value;
         let energies = energies[..tableau.stages].iter();
         let excursion = energies.map(|energy| (energy - before).abs()).fold(0.0, f64::max);
-        let along = AlongStages { stages, polynomial, scales: parts.scales(&chart.end) };
+        let along = AlongStages { stages, polynomial, timed, scales: parts.scales(&chart.end) };
         let laws = parts.each_law(|law| along.of(law, start(law), correction(law), &mut w));
         Self { w, laws, excursion }
     }
@@ -242,6 +248,8 @@ impl<L: Lengths> StageCovectors<L> {
 struct AlongStages<'a, L: Lengths> {
     stages: &'a StagePoints<L>,
     polynomial: &'a StepPolynomial<'a, L>,
+    /// The energy, if it depends on time.
+    timed: Option<Timed<'a, L>>,
     /// The sizes of the entries at the end.
     scales: L::Vector,
 }
@@ -256,19 +264,41 @@ impl<L: Lengths> AlongStages<'_, L> {
         correction: Correction,
         w: &mut Stages<OfLaws<L::Vector>>,
     ) -> LawOfStages<L::Vector> {
-        let Self { stages, polynomial, scales } = self;
+        let Self { stages, polynomial, scales, .. } = self;
         let &StepPolynomial { parts, tableau, chart, h, unit, .. } = *polynomial;
-        let (s, end) = (tableau.stages, parts.value(law, &chart.end));
+        let timed = self.timed.as_ref().filter(|_| law == ENERGY);
+        let [end, terms] = match timed {
+            Some(timed) => {
+                let [change, terms] = timed.change(&chart.end);
+                [start.value + change, terms]
+            }
+            None => [parts.value(law, &chart.end), 0.0],
+        };
+        let s = tableau.stages;
         let (in_unit, [step, size_of_step]) = (unit.recip(), [h * unit, h.abs() * unit]);
         let (mut slope, mut change) = (0.0, 0.0);
-        let mut size = start.value.abs() + end.abs();
+        let (mut by_time, mut rates) = (0.0, 0.0);
+        let mut size = start.value.abs() + end.abs() + terms;
         for i in 0..s {
             let (w, v) = (&*w[i].of_mut(law), stages.v[i].map(|v| v * in_unit));
             slope += tableau.weights[i] * step * dot(w, &v);
             change += tableau.weights[i] * size_of_step * parts.pairing_size(w, &v);
             size += tableau.weights[i] * sum_of_terms(w, scales);
+            if let Some(timed) = timed {
+                let [rate, terms] = timed.rate(tableau.nodes[i], &stages.x[i]);
+                slope += tableau.weights[i] * rate;
+                by_time += tableau.weights[i] * rate;
+                change += tableau.weights[i] * rate.abs();
+                rates += tableau.weights[i] * terms;
+            }
         }
-        let none = LawOfStages { end, size, noise: parts.zero(), left: 0.0, left_round_off: 0.0 };
+        let none = LawOfStages {
+            end: end - by_time,
+            size,
+            noise: parts.zero(),
+            left: 0.0,
+            left_round_off: 0.0,
+        };
         if correction == Correction::None {
             return none;
         }
@@ -282,6 +312,8 @@ impl<L: Lengths> AlongStages<'_, L> {
             delta += weight * (integral - delta);
             noise *= 1.0 - weight;
         }
+        // Both have the rates of time as terms.
+        noise += f64::EPSILON * rates;
         // A change without digits is none.
         if delta.abs() <= NO_DIGITS {
             delta = 0.0;
@@ -317,14 +349,15 @@ impl<L: Lengths> AlongStages<'_, L> {
     #[inline]
     fn integral(&self, law: usize) -> f64 {
         let StepPolynomial { parts, tableau, chart, .. } = self.polynomial;
+        let timed = self.timed.as_ref().filter(|_| law == ENERGY);
         tableau.points().iter().fold(0.0, |sum, point| {
             let q = self.polynomial.combined(&point.position);
             let v = self.polynomial.combined(&point.velocity);
-            let at = parts.moved(&chart.z, &q);
-            let [slope, _] = if parts.is_flat() {
-                parts.along(law, &at, &v)
-            } else {
-                parts.along(law, &at, &parts.velocity_at(&at, (&chart.z, &q), &v))
+            let x = parts.moved(&chart.z, &q);
+            let v = if parts.is_flat() { v } else { parts.velocity_at(&x, (&chart.z, &q), &v) };
+            let slope = match timed {
+                Some(timed) => timed.slope(point.node, &x, &v) + timed.rate(point.node, &x)[0],
+                None => parts.along(law, &x, &v)[0],
             };
             sum + point.weight * slope
         })

@@ -3,6 +3,7 @@
 use metriplectic_equations::{ENERGY, ENTROPY};
 
 use super::chart::StepChart;
+use super::clock::{Clock, Timed};
 use super::covectors::{
     LawOfStages, StageCovectors, StagePoints, StepPolynomial, all_finite, combined, displacements,
     of_law, zeros,
@@ -40,6 +41,8 @@ pub(super) struct StageEquation<'a, L: Lengths> {
     /// The model at the times of the stages, if its force depends on time and does work. Then `parts` is that in the middle of the
     /// step.
     pub(super) in_time: Option<&'a [Parts<'a, L>]>,
+    /// The energy in time, if it depends on it.
+    pub(super) clock: Option<&'a Clock<'a, L>>,
 }
 
 // By hand, because lengths have none.
@@ -103,7 +106,8 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         } else {
             None
         };
-        Self { tableau, parts, x, h, values, drift, heats, rounding: parts.zero(), in_time: None }
+        let rounding = parts.zero();
+        Self { tableau, parts, x, h, values, drift, heats, rounding, in_time: None, clock: None }
     }
 
     /// The equation of a step of a fraction of the size, which takes nothing back.
@@ -239,13 +243,16 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         self.in_time.map_or(self.parts, |stages| &stages[i])
     }
 
-    /// The stages at these velocities with their covectors.
-    pub(super) fn stages(&self, k: &Unknowns<L>) -> Option<(StagePoints<L>, StageCovectors<L>)> {
+    /// The stages at these velocities with their covectors, and the middle of the chart.
+    pub(super) fn stages(
+        &self,
+        k: &Unknowns<L>,
+    ) -> Option<(StagePoints<L>, StageCovectors<L>, L::State)> {
         let chart = self.chart(k)?;
         let polynomial = self.polynomial(&chart, k);
         let stages = StagePoints::of(&polynomial)?;
         let covectors = self.covectors(&stages, &polynomial);
-        Some((stages, covectors))
+        Some((stages, covectors, chart.z))
     }
 
     /// The errors of the energy and the further invariants at the end, in units of round-off.
@@ -294,7 +301,12 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
             ENERGY if tableau.one_sided && in_time.is_some() => Correction::Raised,
             _ => Correction::Here,
         };
-        StageCovectors::of(stages, polynomial, start, correction)
+        let z = &polynomial.chart.z;
+        let timed = self.clock.zip(*in_time).map(|(clock, in_time)| {
+            let share = clock.share(tableau, &stages.x, z);
+            Timed { clock, in_time, x: self.x, z, share }
+        });
+        StageCovectors::of(stages, polynomial, timed, start, correction)
     }
 }
 

@@ -3,6 +3,7 @@
 
 use metriplectic_equations::Path;
 
+use super::clock::Clock;
 use super::covectors::{all_finite, combined, each_stage, zeros};
 use super::equation::{StageEquation, Unknowns};
 use super::fallbacks;
@@ -23,6 +24,7 @@ pub(in crate::implicit) struct StageSolution<L: Lengths> {
     /// The end of the step, with the digits that earlier steps have lost.
     pub(in crate::implicit) end: L::State,
     pub(in crate::implicit) stages: Vec<Stage<L>>,
+    pub(in crate::implicit) frozen: Frozen<L>,
     /// The loss of energy beside work and heat of the stages, in a method that damps: not positive.
     pub(in crate::implicit) lost: f64,
     pub(in crate::implicit) evidence: Evidence,
@@ -38,18 +40,23 @@ pub(in crate::implicit) struct Stage<L: Lengths> {
     pub(in crate::implicit) entropy: L::Vector,
 }
 
+/// The frozen state of the work of the time, with its share.
+pub(in crate::implicit) type Frozen<L> = (<L as Lengths>::State, f64);
+
 /// A step of a model with the model at the time of each stage.
 pub(in crate::implicit) struct TimedStep<'a, L: Lengths> {
     pub(in crate::implicit) method: Collocation,
     /// The start, with the model in the middle of the step.
     pub(in crate::implicit) start: &'a Start<'a, L>,
     pub(in crate::implicit) in_time: &'a [Parts<'a, L>],
+    /// The energy in time, if it depends on it.
+    pub(in crate::implicit) clock: Option<&'a Clock<'a, L>>,
 }
 
 impl<'a, L: Lengths> TimedStep<'a, L> {
     fn equation(&self) -> StageEquation<'a, L> {
         let equation = StageEquation::new(self.method.tableau, self.start);
-        StageEquation { in_time: Some(self.in_time), ..equation }
+        StageEquation { in_time: Some(self.in_time), clock: self.clock, ..equation }
     }
 
     /// Solves a step, and adds the digits that earlier steps have lost of the position. What it leaves of the laws is for the
@@ -117,18 +124,23 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         self.solution(&equation, &solved, effort).ok()
     }
 
-    /// The stages of the step that was solved last.
-    pub(in crate::implicit) fn stages(&self, memory: &StageNumbers<L>) -> Option<Vec<Stage<L>>> {
-        self.listed(&self.equation(), &memory.last.as_ref()?.k).map(|(stages, _)| stages)
+    /// The stages of the step that was solved last, with the frozen state.
+    pub(in crate::implicit) fn stages(
+        &self,
+        memory: &StageNumbers<L>,
+    ) -> Option<(Vec<Stage<L>>, Frozen<L>)> {
+        let k = &memory.last.as_ref()?.k;
+        self.listed(&self.equation(), k).map(|(stages, frozen, _)| (stages, frozen))
     }
 
-    /// Lists stages, with what is left of the energy.
+    /// Lists stages, with the frozen state and what is left of the energy.
     fn listed(
         &self,
         equation: &StageEquation<'_, L>,
         k: &Unknowns<L>,
-    ) -> Option<(Vec<Stage<L>>, f64)> {
-        let (tableau, (points, covectors)) = (self.method.tableau, equation.stages(k)?);
+    ) -> Option<(Vec<Stage<L>>, Frozen<L>, f64)> {
+        let (tableau, (points, covectors, z)) = (self.method.tableau, equation.stages(k)?);
+        let share = self.clock.map_or(1.0, |clock| clock.share(tableau, &points.x, &z));
         let stage = |i: usize| Stage {
             node: tableau.nodes[i],
             weight: tableau.weights[i],
@@ -136,7 +148,8 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
             energy: covectors.w[i].energy.clone(),
             entropy: covectors.w[i].entropy.clone(),
         };
-        Some(((0..tableau.stages).map(stage).collect(), covectors.laws.energy.left))
+        let stages = (0..tableau.stages).map(stage).collect();
+        Some((stages, (z, share), covectors.laws.energy.left))
     }
 
     fn solution(
@@ -153,7 +166,7 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         if self.start.parts.is_outside(&at.end) {
             return Err(failed(Cause::Edge));
         }
-        let (stages, left) = self.listed(equation, k).ok_or(failed(Cause::Edge))?;
+        let (stages, frozen, left) = self.listed(equation, k).ok_or(failed(Cause::Edge))?;
         let evidence = Evidence {
             entropy_slope: at.entropy_slope,
             dissipates: at.growth != 0.0,
@@ -162,6 +175,6 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
             ..Evidence::default()
         };
         let lost = if tableau.one_sided { left.min(0.0) } else { 0.0 };
-        Ok(StageSolution { end: at.end.clone(), stages, lost, evidence, effort })
+        Ok(StageSolution { end: at.end.clone(), stages, frozen, lost, evidence, effort })
     }
 }

@@ -1,25 +1,19 @@
-//! Directions of an open lattice: those of its sites, with the clock and what is booked beside them.
+//! Directions of an open flow whose number is known at run time: those of its points, with the clock and what is booked beside them.
 
-use metriplectic_integrators::Vector;
+use crate::round_off::bound::SUMMED;
+use crate::step::Vector;
 
-use crate::vector::SiteVector;
-
-/// A displacement or a rate of an open lattice: the numbers of its sites, which alone count in norms, and those of the clock
+/// A displacement or a rate of an open flow: the numbers of its points, which alone count in norms, and those of the clock
 /// and of the ledger beyond [`len`](Vector::len). A combination of rates integrates all of them.
 #[derive(Clone, Debug)]
-pub struct OpenSiteVector {
-    pub(super) v: SiteVector,
-    /// The time, and what is booked.
-    pub(super) beside: Vec<f64>,
+pub struct Beside<V> {
+    /// The numbers of the points.
+    pub v: V,
+    /// The time, the work of the time in the energy, and what ports and baths book.
+    pub beside: Vec<f64>,
 }
 
-impl OpenSiteVector {
-    pub(super) const fn new(v: SiteVector, beside: Vec<f64>) -> Self {
-        Self { v, beside }
-    }
-}
-
-impl Vector for OpenSiteVector {
+impl<V: Vector> Vector for Beside<V> {
     fn len(&self) -> usize {
         self.v.len()
     }
@@ -49,7 +43,7 @@ impl Vector for OpenSiteVector {
     fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
         let count = vectors[0].beside.len();
         let beside = (0..count).map(|i| f(vectors.map(|v| v.beside[i]))).collect();
-        Self { v: SiteVector::zip(vectors.map(|v| &v.v), f), beside }
+        Self { v: V::zip(vectors.map(|v| &v.v), f), beside }
     }
 
     fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
@@ -61,11 +55,11 @@ impl Vector for OpenSiteVector {
             let sum = (1..count).fold(of(0), |sum, j| sum + of(j));
             // The rows of a tableau have entries of tens, whose rounding would set the clock of a stage beyond the end.
             let size = || (0..count).fold(0.0, |size, j| size + of(j).abs());
-            let is_end = i == 0 && (sum - 1.0).abs() <= 64.0 * f64::EPSILON * size();
+            let is_end = i == 0 && (sum - 1.0).abs() <= SUMMED * size();
             h * if is_end { 1.0 } else { sum }
         });
         let beside = beside.collect();
-        let v = SiteVector::combination(h, count, |j| {
+        let v = V::combination(h, count, |j| {
             let (w, v) = term(j);
             (w, &v.v)
         });
@@ -77,14 +71,14 @@ impl Vector for OpenSiteVector {
     }
 
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
-        SiteVector::norm_of(vectors.map(|v| &v.v), f)
+        V::norm_of(vectors.map(|v| &v.v), f)
     }
 
     fn norms_of<const K: usize>(
         vectors: [&Self; K],
         f: impl Fn([f64; K]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        SiteVector::norms_of(vectors.map(|v| &v.v), f)
+        V::norms_of(vectors.map(|v| &v.v), f)
     }
 
     fn beside_relative_to(&self, sizes: &Self) -> f64 {
@@ -110,7 +104,7 @@ impl Vector for OpenSiteVector {
         list
     }
 
-    /// The short list of the sites, then the clock and the ledger; the whole list if this one has the length of a list of the sites.
+    /// The short list of the points, then the clock and the ledger; the whole list if this one has the length of a list of the points.
     fn to_short_list(&self) -> Vec<f64> {
         let mut list = self.v.to_short_list();
         list.extend(&self.beside);
@@ -127,10 +121,10 @@ impl Vector for OpenSiteVector {
 
     fn with_list(&self, list: &[f64]) -> Option<Self> {
         let (length, count) = (self.v.len(), self.beside.len());
-        let of_sites = [length, self.v.kinds()];
-        let split = list.len().checked_sub(count).filter(|split| of_sites.contains(split));
+        let of_points = [length, self.v.kinds()];
+        let split = list.len().checked_sub(count).filter(|split| of_points.contains(split));
         match split {
-            Some(split) if !of_sites.contains(&list.len()) => {
+            Some(split) if !of_points.contains(&list.len()) => {
                 let (v, beside) = list.split_at(split);
                 Some(Self { v: self.v.with_list(v)?, beside: beside.to_vec() })
             }

@@ -47,6 +47,7 @@
 
 mod builder;
 mod closed;
+mod equations;
 mod error;
 mod flow;
 mod fluctuating;

@@ -16,6 +16,7 @@ const LAYOUT: &[(&str, &str)] = &[
     ("explicit/step.rs", "COUNT"),
     ("explicit/tableau.rs", "STAGES"),
     ("midpoint/predictor.rs", "DIFFERENCES"),
+    ("noise/equations.rs", "NO_CLOCK"),
     ("noise/numbers.rs", "UNIT"),
     ("noise/sampler.rs", "MOST"),
     ("numbers/referred_rise.rs", "VECTORS"),

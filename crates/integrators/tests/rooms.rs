@@ -35,7 +35,7 @@ const ROOMS: [(&str, &[&str]); 19] = [
     ),
     ("compiled", &["step", "explicit", "numbers", "implicit"]),
     ("run", &["step", "round_off", "numbers", "implicit", "compiled"]),
-    ("noise", &["step", "explicit"]),
+    ("noise", &["step", "explicit", "numbers"]),
     (
         "open",
         &[

@@ -83,6 +83,37 @@ pub enum NoiseError {
          entropy; exp(S/k_B) would not be its law"
     )]
     NoiseAndPublished,
+    /// A system of your own lists other terms of its friction than it says.
+    #[error(
+        "the friction lists {found} terms where `FrictionTerms::term_count` says {expected}, or a direction beyond the {directions} that there \
+         are, which are counted from 0"
+    )]
+    BadTerms {
+        /// How many terms are listed.
+        found: usize,
+        /// How many there are to be.
+        expected: usize,
+        /// The number of directions.
+        directions: usize,
+    },
+    /// The terms of the friction of a system of your own are not those of its motion.
+    #[error(
+        "the terms of `FrictionTerms` break {law} by {off:.1e}, of {size:.1e}: the noise would be that of another friction"
+    )]
+    TermsOff {
+        /// The law.
+        law: &'static str,
+        /// By how much.
+        off: f64,
+        /// The size of the terms.
+        size: f64,
+    },
+    /// A system of your own with noise does not live on a vector space.
+    #[error(
+        "the noise of a system of your own is that on a vector space: answer `Equations::is_vector_space` if its charts are translations, or \
+         write it by `System::on(..)`"
+    )]
+    NotAVectorSpace,
     /// A bath has noise, and further invariants are listed, which it would not keep.
     #[error(
         "the noise of a bath does not keep the further invariants that are listed; leave them out of the list"

@@ -33,9 +33,9 @@ derivatives along parameters          | a family   | a family  | its ledger   | 
 `verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 `report`                              | report     | columns   | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 
-thermal noise in its builder          | promises   | rubbed    | books        | –         | –          | ring     | warm sites   | –             | E0277        | E0277
-an energy that depends on time        | promises   | pushed    | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
-ports and baths                       | promises   | pushed    | –            | books     | –          | promises | –            | warm sites    | E0599        | E0599
+thermal noise in its builder          | promises   | rubbed    | books        | –         | –          | ring     | warm sites   | –             | terms        | terms
+an energy that depends on time        | promises   | pushed    | –            | books     | books      | masses   | masses       | field         | masses       | masses
+ports and baths                       | promises   | pushed    | –            | books     | –          | promises | –            | warm sites    | masses       | masses
 
 events                                | events     | saltation | ledger       | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
 jumps                                 | promises   | saltation | kicks        | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
@@ -300,6 +300,13 @@ pub(crate) const TESTS: &[Reference] = &[
         "if the parts of the system are [known apart](recipes.md#a-system-of-your-own), along \
          geodesics if these are known too, \
          and up to 1024 variables; others are refused (`NoImplicitSteps`)",
+    ),
+    right("masses", "tests/protocols.rs", "two_masses_run_alike_however_they_are_built"),
+    right("field", "tests/protocols.rs", "a_field_on_masses_with_noise_does_work"),
+    partly(
+        "terms",
+        ["tests/protocols.rs", "a_path_of_ones_own_is_that_of_a_typed_system"],
+        "on vector spaces, if the system [lists the terms of its friction](recipes.md#surroundings-and-noise-of-your-own)",
     ),
     right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),
     right(

@@ -105,6 +105,11 @@ const ROOM: &str = ".opened()
     .work(\"nothing\", [0], |t, _, u: &Vector1<f64>| u * 0.0)
     .bath(\"room\", 1.0, [1], |_, at: &SiteState<'_, Euclidean<1>>| [Onsager { rate: at.x.x, b: vector![1.0] }])";
 
+/// An energy of each site of a lattice that depends on time.
+const FIELD: &str = ".energy_in_time(|t, _, p: &Vector3<Real>| p.x * t.sin())";
+/// A bath of a system of one's own, of `n` entries.
+const AIR: &str = ".bath(\"air\", 1.0, move |_, contact| contact(0.1, &[(n - 2, 1.0)]))";
+
 const OF_ENERGY: &str =
     ".energy(|p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.z * p.z * 1.5)";
 const OF_CLOCK: &str = ".energy_in_time(|t: Real, p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.x * t.sin())";
@@ -166,15 +171,29 @@ fn with(kind: Kind, part: &str) -> String {
         ("noise", Open) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
         ("noise", Lattice | OpenLattice) => "let _ = s.with_noise(Boltzmann(0.1));".to_owned(),
         ("noise", _) => format!(
-            "let n = Noisy::new(s, metriplectic::integrators::noise::Noise::of(Boltzmann(0.1)));
+            "let n = s.with_noise(Boltzmann(0.1));
     let _ = RandomFlow(DormandPrince8).seed(1).run(&n, x, {STEPS})?;"
         ),
         ("clock", Closed) => built(CLOCK),
         ("clock", Family) => member(OF_CLOCK, "DormandPrince8", "s.start(x)"),
         ("clock", Noisy) => built(&format!("{CLOCK}{NOISE}")),
         ("clock", NoisyOpen) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
-        ("clock", OpenLattice) => format!("let _ = s{CLOCK};"),
-        ("clock", _) => format!("let _ = s.opened(){CLOCK};"),
+        ("clock", Lattice) => format!("let _ = s.opened(){FIELD};"),
+        ("clock", OpenLattice) => format!("let _ = s{FIELD};"),
+        ("clock", NoisyLattice) => {
+            "let _ = s.energy_in_time(|t, _, u: &Vector1<Real>| u.x * t.sin() * 0.1);".to_owned()
+        }
+        ("clock", Own | Sizes) => format!(
+            "let mut s = s;
+    s.0.drive = 0.1;
+    let o = s.opened();
+    let _ = DormandPrince8.run(&o, o.start(x), {STEPS})?;"
+        ),
+        ("ports", Own | Sizes) => format!(
+            "let n = x.len();
+    let o = s.opened().work(\"motor\", |t, _, v| v[1] = t.sin()){AIR};
+    let _ = DormandPrince8.run(&o, o.start(x), {STEPS})?;"
+        ),
         ("ports", Closed) => built(&format!("{ENERGY}{PORT}{BATH}")),
         ("ports", Family) => {
             member(&format!("{OF_ENERGY}{OF_ROOM}"), "DormandPrince8", "s.start(x)")
@@ -292,7 +311,7 @@ fn verb(kind: Kind, name: &str) -> String {
 
 /// The lines in front of each program.
 const HEAD: &str = "#![allow(unused)]
-use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
+use metriplectic::equations::{Covectors, ENERGY, ENTROPY, Equations, FrictionTerms, Sizes, Terms};
 use metriplectic::integrators::{Entries, FromEquations};
 use metriplectic::prelude::*;
 ";

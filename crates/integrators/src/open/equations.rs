@@ -462,11 +462,11 @@ impl<S: Equations> OpenFlow for OpenEquations<S> {
         if self.parts.is_empty() {
             return Ok(());
         }
-        let (time, n, all) = (state.time, state.x.len(), self.covectors(state.time, &state.x));
+        let (time, all) = (state.time, self.covectors(state.time, &state.x));
         let directions = self.system.sizes().directions;
         let row = |law: usize| &all[law * directions..][..directions];
         let at = EntriesAt { t: time, x: &state.x, w: row(ENERGY), s: row(ENTROPY) };
-        let point = || state.x[..n].to_vec();
+        let point = || state.x.to_vec();
         // 0/0 = 0: a law that nothing changes is kept.
         let slope = |law: &[f64], v: &[f64]| {
             let terms: f64 = law.iter().zip(v).map(|(a, b)| (a * b).abs()).sum();

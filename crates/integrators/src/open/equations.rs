@@ -7,7 +7,8 @@ use metriplectic_dynamics::exchange::Temperature;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{
-    Apart, Covectors, ENERGY, ENTROPY, Equations, Kind, Part, Path, Paths, PointError, Report, Sizes, Terms,
+    Apart, Covectors, ENERGY, ENTROPY, Equations, Kind, Part, Path, Paths, PointError, Report,
+    Sizes, Terms,
 };
 
 use super::state::{Ledger, OpenState};
@@ -66,7 +67,7 @@ struct Effect {
 /// ```
 ///
 /// with the motion `f` of the system. The laws are those of [open systems](crate::open), on every step of every method. Implicit
-/// methods ask for the [parts](metriplectic_equations::Differences) of the system, on a vector space. Where the energy depends
+/// methods ask for the [parts](metriplectic_equations::Differences) of the system. Where the energy depends
 /// on time the system says so ([`Equations::energy_depends_on_time`]) and answers [`Equations::power`], and the work `W_t` of the time is
 /// booked.
 ///

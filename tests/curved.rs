@@ -20,9 +20,9 @@ where
     Y: Metriplectic,
     N: Method<Y> + for<'a> Method<FromEquations<InNumbers<'a, Y>>> + Copy,
 {
-    let typed = method.run(system, x.clone(), schedule.clone()).unwrap();
+    let typed = method.run(system, x.clone(), schedule.clone()).expect("a run in types");
     let numbers = FromEquations(InNumbers(system));
-    let run = method.run(&numbers, Y::Manifold::entries(x).into(), schedule).unwrap();
+    let run = method.run(&numbers, Y::Manifold::entries(x).into(), schedule).expect("a run");
     let certificates = [typed.certificate(), run.certificate()];
     for certificate in certificates {
         assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
@@ -57,9 +57,9 @@ fn agrees<Y: Metriplectic>(name: &str, system: &Y, x: &Point<Y>, h: f64) {
     let (model, x) = (InNumbers(system), Y::Manifold::entries(x));
     let u: Vec<f64> = (0..model.sizes().directions).map(|i| 0.3 - 0.17 * i as f64).collect();
     for path in [Path::Exponential, Path::Weyl, Path::Chart] {
-        laws::paths(&model, &model, path, &x, &u).unwrap();
+        laws::paths(&model, &model, path, &x, &u).expect("paths");
     }
-    laws::paths(&model, &ByCharts(&model), Path::Chart, &x, &u).unwrap();
+    laws::paths(&model, &ByCharts(&model), Path::Chart, &x, &u).expect("lines of charts");
 }
 
 #[test]
@@ -329,6 +329,7 @@ fn a_system_with_charts_of_its_own_is_driven() {
     }
 }
 
+type SpinAt<T> = (Vector3<T>, Vector1<T>);
 type Warm = Product<Sphere<2>, Euclidean<1>>;
 
 /// The largest distance of two states.
@@ -344,9 +345,7 @@ fn lattices_on_curved_sites_have_implicit_steps() {
         .bracket((AreaForm, Zero))
         .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| n.z * n.z * 0.5 + n.x * 0.3 + s.x.exp())
         .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
-        .bond_energy(|(a, b): &((Vector3<Real>, Vector1<Real>), (Vector3<Real>, Vector1<Real>))| {
-            a.0.dot(&b.0) * -0.4
-        })
+        .bond_energy(|(a, b): &(SpinAt<Real>, SpinAt<Real>)| a.0.dot(&b.0) * -0.4)
         .site_onsager(|site| {
             let w = site.w;
             [

@@ -49,7 +49,7 @@ mod geodesic_jet;
 pub mod half_line;
 #[doc(hidden)]
 pub mod in_numbers;
-mod inert;
+pub mod inert;
 pub mod inner_product;
 pub mod laws;
 pub mod lie_algebra;

@@ -7,7 +7,7 @@ use metriplectic::dynamics::{InNumbers, Metriplectic, system::Point};
 use metriplectic::equations::{
     Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, SecondLaw, Sizes, laws,
 };
-use metriplectic::equations::{ByCharts, Path, Paths as _};
+use metriplectic::equations::{ByCharts, Path};
 use metriplectic::fields::Space as _;
 use metriplectic::integrators::{
     Entries, FromEquations, ItohAbe, Method, NoImplicitSteps, Schedule, SymmetricItohAbe,
@@ -184,10 +184,6 @@ impl Equations for Spin {
         let [a, b] = frame(n).map(|e| e.dot(&across) * stretch);
         q.copy_from_slice(&[a, b, after - s]);
         sine.atan2(cosine) < 1.5
-    }
-
-    fn stage_rates(&self, x: &[f64], _: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
-        ByCharts(&Differences(Self)).velocity_at(x, y, &[0.0; 3], v, rates);
     }
 }
 

@@ -124,11 +124,10 @@ pub trait Equations {
         let _ = self.coordinates(x, y, q);
     }
 
-    /// Computes the rates `q'` at `y = ψ_x(q)` of the velocity `v` in the frame at `y`. The default is `v`, as in charts that are
-    /// translations.
+    /// Computes the rates `q'` at `y = ψ_x(q)` of the velocity `v` in the frame at `y`: `d/ds ψ_x⁻¹(φ_y(sv))`. The default is `v` where
+    /// the charts are translations, and elsewhere this derivative by a difference, with some twelve digits.
     fn stage_rates(&self, x: &[f64], q: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
-        let _ = (x, q, y);
-        rates.copy_from_slice(v);
+        crate::paths::rates(self, [x, q, y, v], rates);
     }
 
     /// Computes the velocity and the production at a state whose differentials `w` are known, of all laws: what a step asks for

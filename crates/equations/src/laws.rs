@@ -18,7 +18,7 @@ const CANCELS: f64 = 1e-9;
 ///    the values; 4. `⟨dF, u⟩` is the derivative of each law along `φ_x(su)`; 5. the velocity conserves the energy and
 ///    the further invariants, the production is not negative, and it is `⟨dS, x'⟩` of an
 ///    [exact](SecondLaw::Exact) second law; 6. `ψ_x(0) = x`, the rates
-///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`; 7. in a vector space both charts are `x + u`, the
+///    there are the velocity, the stage coordinates are the inverse of `ψ_x`, and the rates at `ψ_x(u)` are their derivative; 7. in a vector space both charts are `x + u`, the
 ///    rates in them are the velocity, and the sizes are `|x_i|`; 8. the power is the derivative of the energy along time.
 ///
 /// The fifth law is that of a closed system.
@@ -88,6 +88,17 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
     if system.stage_state(x, u, &mut y) {
         system.stage_coordinates(x, &y, &mut q);
         near("ψ_x⁻¹(ψ_x(u)) = u", &q, u)?;
+        system.stage_rates(x, u, &y, &v, &mut rates);
+        derivative(
+            "the rates are the derivative of ψ_x⁻¹ along the velocity",
+            &rates,
+            &|s, to| {
+                let (mut there, mut q) = (nan(entries), nan(n));
+                system.chart(&y, &scaled(&v, s), &mut there);
+                system.stage_coordinates(x, &there, &mut q);
+                to.extend(q);
+            },
+        )?;
     }
     if system.is_vector_space() {
         same("a vector space has an entry in each direction", entries as f64, n as f64)?;

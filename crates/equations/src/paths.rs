@@ -1,7 +1,7 @@
 //! The paths of steps: a straight line on a vector space, a curve of a retraction elsewhere.
 
 use crate::room::with_numbers;
-use crate::{MetricError, Model};
+use crate::{Equations, MetricError, Model};
 
 /// The retraction of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,35 +168,61 @@ const LENGTH: f64 = 1e-3;
 /// A factor of four is nowhere near either.
 const SEEN: f64 = 1e-6;
 
+/// The fraction of a vector that changes no entry by more than [`LENGTH`] of its size at `x`, or of the way from there. An entry
+/// that is near zero has the size of the way.
+fn fraction(system: &(impl Equations + ?Sized), x: &[f64], ways: [&[f64]; 2], v: &[f64]) -> f64 {
+    with_numbers(v.len(), |sizes| {
+        system.scales(x, sizes);
+        let mut most = 0.0_f64;
+        for (i, size) in sizes.iter().enumerate() {
+            let size = ways.iter().map(|way| way[i].abs()).fold(*size, f64::max);
+            if size > 0.0 {
+                most = most.max((v[i] / size).abs());
+            }
+        }
+        if most > 0.0 && most.is_finite() { LENGTH / most } else { LENGTH }
+    })
+}
+
+/// The derivative at zero of a function of the fraction of a vector, by a difference of this length.
+fn derivative(h: f64, mut f: impl FnMut(f64, &mut [f64]), to: &mut [f64]) {
+    to.fill(0.0);
+    with_numbers(to.len(), |value| {
+        for (fraction, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
+            f(fraction * h, value);
+            to.iter_mut().zip(&*value).for_each(|(to, value)| *to += weight * value);
+        }
+    });
+    to.iter_mut().for_each(|to| *to /= 12.0 * h);
+}
+
+/// The rates at `y = ψ_x(q)` of the velocity `v` there, `d/ds ψ_x⁻¹(φ_y(sv))`; those of charts that are translations are `v`.
+pub(crate) fn rates(
+    system: &(impl Equations + ?Sized),
+    [x, q, y, v]: [&[f64]; 4],
+    rates: &mut [f64],
+) {
+    let is_sum = |y: &[f64], x: &[f64], q: &[f64]| {
+        let mut sums = x.iter().zip(q).map(|(x, q)| x + q).zip(y);
+        x.len() == q.len() && sums.all(|(sum, y)| sum.to_bits() == y.to_bits())
+    };
+    with_numbers(y.len() + v.len(), |room| {
+        let (there, part) = room.split_at_mut(y.len());
+        system.chart(y, v, there);
+        if is_sum(y, x, q) && is_sum(there, y, v) {
+            return rates.copy_from_slice(v);
+        }
+        let h = fraction(system, y, [q, q], v);
+        let along = |s: f64, to: &mut [f64]| {
+            part.iter_mut().zip(v).for_each(|(part, v)| *part = s * v);
+            system.chart(y, part, there);
+            system.stage_coordinates(x, there, to);
+        };
+        derivative(h, along, rates);
+    });
+}
+
 impl ByCharts<'_> {
-    /// The fraction of a vector that changes no entry by more than [`LENGTH`] of its size at `x`, or of the way from there. An entry
-    /// that is near zero has the size of the way.
-    fn step(&self, x: &[f64], ways: [&[f64]; 2], v: &[f64]) -> f64 {
-        with_numbers(v.len(), |sizes| {
-            self.0.scales(x, sizes);
-            let mut most = 0.0_f64;
-            for (i, size) in sizes.iter().enumerate() {
-                let size = ways.iter().map(|way| way[i].abs()).fold(*size, f64::max);
-                if size > 0.0 {
-                    most = most.max((v[i] / size).abs());
-                }
-            }
-            if most > 0.0 && most.is_finite() { LENGTH / most } else { LENGTH }
-        })
-    }
-
-    /// The derivative at zero of a function of the fraction of a vector, by a difference of this length.
-    fn derivative(&self, h: f64, f: impl Fn(f64, &mut [f64]), to: &mut [f64]) {
-        to.fill(0.0);
-        with_numbers(to.len(), |value| {
-            for (fraction, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
-                f(fraction * h, value);
-                to.iter_mut().zip(&*value).for_each(|(to, value)| *to += weight * value);
-            }
-        });
-        to.iter_mut().for_each(|to| *to /= 12.0 * h);
-    }
-
     /// Refuses a way whose middle `z` the chart at the start does not see in the middle: it leads beyond the chart.
     fn reached(&self, x: &[f64], half: &[f64], z: &[f64]) -> Result<(), MetricError> {
         if self.0.is_vector_space() {
@@ -251,7 +277,7 @@ impl ByCharts<'_> {
                 self.velocity_at(y, x, at, turned, to);
             });
         };
-        self.derivative(self.step(x, [q, way], p), along, to);
+        derivative(fraction(self.0, x, [q, way], p), along, to);
     }
 }
 
@@ -340,8 +366,8 @@ impl Paths for ByCharts<'_> {
         let nothing = [0.0; 0];
         with_numbers(q.len(), |back| {
             self.seen_from(y, x, q, &nothing, 0.0, back);
-            let h = self.step(x, [q, back], v);
-            self.derivative(h, |s, to| self.seen_from(y, x, q, v, s, to), to);
+            let h = fraction(self.0, x, [q, back], v);
+            derivative(h, |s, to| self.seen_from(y, x, q, v, s, to), to);
         });
     }
 }
@@ -349,7 +375,7 @@ impl Paths for ByCharts<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Apart, Covectors, Differences, Equations, Part, Sizes};
+    use crate::{Apart, Covectors, Differences, Part, Sizes};
 
     /// Angles, in charts `φ_x(q) = x + 2 atan(q/2)`.
     struct Angle;

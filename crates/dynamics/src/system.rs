@@ -148,7 +148,7 @@ impl<M: Space, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
 /// A system whose energy and entropy can be moved behind pointers, as [`System::erased`] does: a member of a family, an open
 /// system, one with noise too. Ports, baths and all other parts keep their types. A system in plain numbers is moved as a whole.
 pub trait Erase: Sized {
-    /// The same system with energy and entropy behind pointers.
+    /// This system with energy and entropy behind pointers.
     type Erased;
 
     /// Moves energy and entropy behind pointers.

@@ -294,7 +294,7 @@ fn sizes_at(system: &(impl Equations + ?Sized), t: f64, x: &[f64]) -> Vec<Size> 
     sizes_of(system, t, x, x.iter().map(|x| x.abs()).collect())
 }
 
-/// The same, of entries with these sizes of their own.
+/// Returns the sizes of entries with these sizes of their own.
 fn sizes_of(system: &(impl Equations + ?Sized), t: f64, x: &[f64], own: Vec<f64>) -> Vec<Size> {
     let n = system.sizes().directions;
     let [_, w] = jets(system, t, x);
@@ -338,7 +338,7 @@ fn columns(sizes: &[Size], to: &mut [f64], f: impl Fn(&[f64], f64, &mut [f64])) 
     each_column((sizes, 0), to, f);
 }
 
-/// The same, where a quotient that changes if its step is doubled is taken over shorter distances too: an angle that has turned many
+/// Computes the same columns, where a quotient that changes if its step is doubled is taken over shorter distances too: an angle that has turned many
 /// times is larger than the distance over which its functions bend.
 fn checked_columns(sizes: &[Size], to: &mut [f64], f: impl Fn(&[f64], f64, &mut [f64])) {
     each_column((sizes, SHORTER), to, f);

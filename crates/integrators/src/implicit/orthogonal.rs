@@ -119,7 +119,7 @@ impl<L: Lengths> Orthogonal<L> {
     }
 }
 
-/// What is projected.
+/// The vector that is projected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Of {
     Vector,

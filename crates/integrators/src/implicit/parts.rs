@@ -88,7 +88,7 @@ pub(super) struct PartJet<L: Lengths> {
 /// The paths of steps on a space that is not flat.
 #[derive(Clone, Copy)]
 enum Curved<'a> {
-    /// Those of the model.
+    /// The paths of the model.
     Known(&'a dyn Paths),
     /// The lines of its charts.
     ByCharts(ByCharts<'a>),
@@ -106,7 +106,7 @@ pub(super) struct CurvedPath<L: Lengths> {
 /// A model, with the answers that do not change.
 pub(crate) struct Parts<'a, L: Lengths> {
     model: &'a dyn Model,
-    /// What the model says of its space, if that is not flat.
+    /// The paths of its space, if that is not flat.
     curved: Option<Curved<'a>>,
     has_metric: bool,
     entries: usize,
@@ -202,7 +202,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         }
     }
 
-    /// What the model says of its space, if that is not flat.
+    /// Returns the paths of a space that is not flat.
     #[inline]
     fn paths(&self) -> Option<&dyn Paths> {
         if const { L::IS_FLAT } {

@@ -34,7 +34,7 @@ pub trait Opening: Sized {
     type Clock;
     /// The ports and baths so far.
     type Exchange;
-    /// The same surroundings with another clock, and with more ports and baths.
+    /// These surroundings with another clock, and with more ports and baths.
     type With<C, X>;
 
     /// Replaces the clock, the ports and the baths.

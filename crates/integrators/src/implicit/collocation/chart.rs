@@ -17,7 +17,7 @@ pub(super) struct StepChart<L: Lengths> {
     turned: Option<Box<Turned<L>>>,
 }
 
-/// What the chart of a step has where it does not come from a vector space.
+/// The numbers of the chart of a step that is not one of a vector space.
 struct Turned<L: Lengths> {
     /// Half of the displacement at the start.
     half: L::Vector,

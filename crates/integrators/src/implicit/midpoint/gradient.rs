@@ -33,7 +33,7 @@ pub(super) struct Line<'a, L: Lengths> {
     curve: Option<Box<Curve<L>>>,
 }
 
-/// What a path has beside a straight line.
+/// The numbers of a path beside those of a straight line.
 struct Curve<L: Lengths> {
     /// The displacement `d` at `z`.
     d: L::Vector,

@@ -281,7 +281,7 @@ impl ByCharts<'_> {
     }
 }
 
-/// A displacement with this error is none.
+/// Refuses a displacement whose numbers are not finite.
 fn finite(d: &[f64]) -> Result<(), MetricError> {
     let quantity = "a displacement in a chart";
     let bad = d.iter().find(|d| !d.is_finite());
@@ -451,8 +451,11 @@ mod tests {
         assert!(!paths.follows(Path::Weyl));
     }
 
-    /// Angles in charts `φ_x(q) = x + q`, of which one sees another within half a turn, and an entry beside that is near zero.
-    struct Turns;
+    /// Angles with an entry beside, in charts `φ_x(q) = x + 2 atan(q/2)`, of which one sees another within half a turn.
+    struct Turns {
+        /// Else they are `φ_x(q) = x + q` on a circle.
+        is_stretched: bool,
+    }
 
     impl Equations for Turns {
         fn sizes(&self) -> Sizes {
@@ -478,14 +481,15 @@ mod tests {
         }
 
         fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
-            y[0] = Angle::turned(x[0], q[0]);
+            y[0] = if self.is_stretched { Angle::turned(x[0], q[0]) } else { x[0] + q[0] };
             y[1] = x[1] + q[1];
         }
 
         fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
             let turn = std::f64::consts::TAU;
             let way = y[0] - x[0];
-            q[0] = 2.0 * (0.5 * (way - turn * (way / turn).round())).tan();
+            let short = way - turn * (way / turn).round();
+            q[0] = if self.is_stretched { 2.0 * (0.5 * short).tan() } else { short };
             q[1] = y[1] - x[1];
             true
         }
@@ -507,7 +511,7 @@ mod tests {
 
     #[test]
     fn a_displacement_keeps_its_digits_where_an_entry_passes_zero() {
-        let model = Differences(Turns);
+        let model = Differences(Turns { is_stretched: true });
         let paths = ByCharts(&model);
         for small in [0.2, 1e-4, 1e-9, -1e-12, 1e-16, 1e-300, 0.0] {
             let (x, u) = ([0.4, small], [0.7, 0.01]);
@@ -517,6 +521,22 @@ mod tests {
             let exact = u[0] / (1.0 + u[0] * u[0] / 16.0);
             assert!((d[0] - exact).abs() < 4e-13 && (d[1] - u[1]).abs() < 4e-15, "{small}: {d:?}");
             crate::laws::paths(&model, &paths, Path::Chart, &x, &u).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_way_around_the_space_is_beyond_the_chart() {
+        let model = Differences(Turns { is_stretched: false });
+        let follow = |u: f64| {
+            let [mut z, mut d, mut end] = [[0.0; 2]; 3];
+            let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+            ByCharts(&model).path(Path::Chart, &[0.4, 1e11], &[u, 1e11], to)
+        };
+        // Its middle is less than half a turn away, and more.
+        assert_eq!([6.0, -6.0].map(|u| follow(u).is_ok()), [true; 2]);
+        for u in [7.0, -7.0, 13.0, 20.0] {
+            let refused = follow(u).unwrap_err();
+            assert!(matches!(refused, MetricError::OutOfChart { .. }), "{u}: {refused}");
         }
     }
 }

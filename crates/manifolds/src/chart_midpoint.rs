@@ -33,7 +33,7 @@ pub struct ChartMidpoint;
 
 /// Refuses a displacement that the chart does not reach.
 #[inline]
-fn reached<M: Manifold>(u: &Vector<M>) -> Result<(), MetricError> {
+pub(crate) fn reached<M: Manifold>(u: &Vector<M>) -> Result<(), MetricError> {
     if M::is_near(&(*u * 0.5)) { Ok(()) } else { Err(beyond::<M>(u)) }
 }
 

@@ -9,6 +9,7 @@ use metriplectic_fields::{Column, Dimension, Matrix, Real, Square, Vector};
 use num_dual::Dual64;
 use smallvec::SmallVec;
 
+use crate::chart_midpoint::reached;
 use crate::{
     ChartMidpoint, Exponential, Manifold, Retraction, Riemannian, StepPath, StepPathJet,
     WeylMidpoint,
@@ -101,12 +102,6 @@ impl<M> Default for LinesInNumbers<M> {
     fn default() -> Self {
         Self(PhantomData)
     }
-}
-
-/// Refuses a displacement that the chart does not reach.
-fn reached<M: Manifold>(u: &Vector<M>) -> Result<(), MetricError> {
-    let distance = u.magnitude();
-    if M::is_near(&(*u * 0.5)) { Ok(()) } else { Err(MetricError::OutOfChart { distance }) }
 }
 
 impl<M: Manifold> Paths for LinesInNumbers<M> {

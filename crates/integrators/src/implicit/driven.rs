@@ -68,7 +68,7 @@ pub(crate) trait DrivenMethod {
     /// The memory from one step to the next.
     type Memory: Memory;
 
-    /// Whether the model of a step has the mean of the energies at both ends.
+    /// Says whether the model of a step has the mean of the energies at both ends.
     const HAS_MEAN_ENERGY: bool;
 
     /// Solves a step; else says why not, with the least residual and what was done.

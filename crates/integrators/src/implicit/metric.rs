@@ -75,7 +75,7 @@ impl<L: Lengths> Factored<L> {
     }
 }
 
-/// The metric at a state. There is none where it is the canonical one.
+/// The metric at a state; `None` for the canonical one.
 #[derive(Clone, Debug)]
 pub(crate) struct Metric<L: Lengths>(Option<Box<Factored<L>>>);
 

@@ -214,7 +214,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         })
     }
 
-    /// Whether charts are translations, and paths straight lines.
+    /// Returns whether charts are translations, and paths straight lines.
     #[inline]
     pub(super) const fn is_flat(&self) -> bool {
         if const { L::IS_FLAT } { true } else { self.curved.is_none() }

@@ -64,7 +64,7 @@ pub trait OpenFlow:
     /// The ledger of the ports and baths, on which nothing is booked.
     fn empty(&self) -> &Ledger;
 
-    /// Whether the energy depends on time.
+    /// Returns whether the energy depends on time.
     fn has_clock(&self) -> bool;
 
     /// The rate `∂_tH(t, x)`; zero if the energy does not depend on time.
@@ -105,10 +105,10 @@ pub trait OpenFlow:
         self.empty().heats().zip(self.temperatures(t)).collect()
     }
 
-    /// Whether a bath takes energy alone.
+    /// Returns whether a bath takes energy alone.
     fn has_cold_bath(&self) -> bool;
 
-    /// Whether the laws were verified before the run.
+    /// Returns whether the laws were verified before the run.
     fn was_verified(&self) -> bool;
 
     /// Verifies the flow of the points at the start of a run.

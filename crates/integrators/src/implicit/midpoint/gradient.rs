@@ -93,7 +93,7 @@ impl<'a, L: Lengths> Line<'a, L> {
         Some(Self { x, u, path, z, end, scales, curve })
     }
 
-    /// Where the base is, as a fraction of the way.
+    /// The place of the base, as a fraction of the way.
     const fn c(&self) -> f64 {
         self.path.base()
     }

@@ -157,7 +157,7 @@ impl<L: Lengths> Equation<'_, L> {
         (0..parts.n()).all(is_within).then_some((u, end))
     }
 
-    /// Whether the ends of paths are good to a few roundings.
+    /// Returns whether the ends of paths are good to a few roundings.
     fn has_closed_geodesics(&self) -> bool {
         self.parts.accuracy(self.line.path) <= ROUNDED
     }

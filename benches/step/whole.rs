@@ -99,6 +99,7 @@ pub(crate) fn rows() -> Vec<Row> {
         Row::whole("chart/order_8", DormandPrince8, chart(), vector![1.0, 0.2], fixed(0.001)),
         Row::whole("ring_24/order_5", DormandPrince5, ring(), waves(), fixed(0.001)),
         Row::whole("ring_24/order_8", DormandPrince8, ring(), waves(), fixed(0.001)),
+        Row::whole("ring_24/midpoint", WeylMidpoint, ring(), waves(), fixed(0.001)),
         Row::whole("ring_24/gauss_3", Gauss::<3>, ring(), waves(), fixed(0.001)),
         Row::whole("ring_24/radau_2", Radau::<2>, ring(), waves(), fixed(0.001)),
         // Each step that is tried, with a tolerance.

@@ -80,6 +80,9 @@ pub(crate) use root::StepRoot;
 pub(crate) use tableau::{STAGES, Tableau};
 pub(crate) use timed::{MOST, Stage, StageSolution, TimedStep};
 
+use crate::implicit::StageNumbers;
+use crate::implicit::many::{self, OfFewOrMany};
+use crate::numbers::AtRunTime;
 use crate::step::failure::Fallbacks;
 use crate::step::{
     Compiled, Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
@@ -160,7 +163,7 @@ macro_rules! method {
         }
 
         impl<Y: Metriplectic, const S: usize> Stepper<Y> for $name<S> {
-            type Memory = StageMemory<Dim<Y>>;
+            type Memory = OfFewOrMany<StageMemory<Dim<Y>>, StageNumbers<AtRunTime>>;
 
             const IS_IMPLICIT: bool = true;
 
@@ -193,46 +196,61 @@ macro_rules! method {
                 &self,
                 start: &StepStart<'_, Y>,
                 h: f64,
-                memory: &mut StageMemory<Dim<Y>>,
+                memory: &mut <Self as Stepper<Y>>::Memory,
             ) -> Result<Taken<Y>, StepError> {
+                // A constant, so that only one of the two is compiled.
+                if const { many::is_of_many::<Y>() } {
+                    return many::step(&Self::in_numbers(), start, h, memory.many());
+                }
                 let start = step::start_of(Self::tableau(), start, h);
-                parts::take(Self::tableau(), Self::SPLITS, &start, memory)
+                parts::take(Self::tableau(), Self::SPLITS, &start, memory.few())
             }
 
             fn attempt(
                 &self,
                 start: &StepStart<'_, Y>,
                 h: f64,
-                memory: &mut StageMemory<Dim<Y>>,
+                memory: &mut <Self as Stepper<Y>>::Memory,
             ) -> Result<Taken<Y>, Refusal> {
+                if const { many::is_of_many::<Y>() } {
+                    return many::attempt(&Self::in_numbers(), start, h, memory.many());
+                }
                 let start = step::start_of(Self::tableau(), start, h);
-                step::try_step(Self::tableau(), &start, memory, Fallbacks::FirstTries).map_err(
-                    |failure| Refusal {
-                        effort: failure.effort,
-                        error: failure.cause.first_law(start.time, h),
-                        second_law: false,
-                    },
-                )
+                let (tableau, memory) = (Self::tableau(), memory.few());
+                let tried = step::try_step(tableau, &start, memory, Fallbacks::FirstTries);
+                tried.map_err(|failure| Refusal {
+                    effort: failure.effort,
+                    error: failure.cause.first_law(start.time, h),
+                    second_law: false,
+                })
             }
 
             fn error(
                 &self,
                 step: &StepEnds<'_, Y>,
-                memory: &StageMemory<Dim<Y>>,
+                memory: &<Self as Stepper<Y>>::Memory,
                 norm: impl Fn(&<Y as Flow>::Vector) -> f64,
             ) -> Option<f64> {
-                dense::error(Self::tableau(), step, memory, norm)
+                match memory {
+                    OfFewOrMany::Few(memory) => dense::error(Self::tableau(), step, memory, norm),
+                    OfFewOrMany::Many(memory) => {
+                        many::error(&Self::in_numbers(), step, memory, norm)
+                    }
+                }
             }
 
             fn between(
                 &self,
                 step: &StepEnds<'_, Y>,
-                memory: &mut StageMemory<Dim<Y>>,
+                memory: &mut <Self as Stepper<Y>>::Memory,
                 theta: f64,
             ) -> Option<Point<Y>> {
+                if const { many::is_of_many::<Y>() } {
+                    return many::between(&Self::in_numbers(), step, memory.many(), theta);
+                }
                 let promises = Stepper::<Y>::promises(self, step.flow);
                 let within = dense::Within { tableau: Self::tableau(), step, theta };
-                dense::between(&within, promises, memory)
+                dense::between(&within, promises, memory.few())
             }
         }
     };

@@ -53,7 +53,7 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 

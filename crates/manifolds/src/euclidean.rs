@@ -11,7 +11,7 @@
 //!   `Poisson::constant` for another skew matrix; `AreaForm` on R² and `Nambu` on R³,
 //!   `x' = ∇S × ∇H`; `Poisson::field` for a matrix that varies (Hairer, Lubich and Wanner 2006, §VII.2).
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
@@ -81,6 +81,23 @@ macro_rules! translations {
             #[inline]
             fn chart<D: Scalar>(x: &SVector<f64, N>, q: &SVector<D, N>) -> SVector<D, N> {
                 Column::from_index(|i| q[i] + x[i])
+            }
+
+            /// A copy of the point in which two entries are seeded.
+            #[inline]
+            fn seeds(x: &SVector<f64, N>) -> impl Fn(usize, usize) -> SVector<Real, N> {
+                // The sum of the chart, which has no zero with a sign.
+                let x: SVector<Real, N> = Column::from_index(|k| Real::from(0.0 + x[k]));
+                move |i, j| {
+                    let mut seeded = x;
+                    if i < N {
+                        seeded[i].eps1 = 1.0;
+                    }
+                    if j < N {
+                        seeded[j].eps2 = 1.0;
+                    }
+                    seeded
+                }
             }
 
             #[inline]

@@ -41,7 +41,7 @@
 //! assert_eq!(LieDual::so4().algebra().coadjoint(&area, &state).norm(), 0.0);
 //! ```
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 

@@ -10,6 +10,8 @@ use super::{Bracket, BracketArgs, BracketJet, PoissonError};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantPoisson<const N: usize> {
     tensor: SMatrix<f64, N, N>,
+    /// The column and the value of the one entry of each row, if no row has more, as where positions are paired with momenta.
+    pairs: Option<[(usize, f64); N]>,
 }
 
 impl<const N: usize> ConstantPoisson<N> {
@@ -25,8 +27,24 @@ impl<const N: usize> ConstantPoisson<N> {
                 }
             }
         }
-        Ok(Self { tensor })
+        Ok(Self { tensor, pairs: pairs(&tensor) })
     }
+}
+
+/// The one entry of each row; `None` if a row has more.
+fn pairs<const N: usize>(tensor: &SMatrix<f64, N, N>) -> Option<[(usize, f64); N]> {
+    let mut pairs = [(0, 0.0); N];
+    for (row, pair) in pairs.iter_mut().enumerate() {
+        let entries = (0..N).map(|column| (column, tensor[(row, column)]));
+        let mut entries = entries.filter(|(_, entry)| *entry != 0.0);
+        if let Some(first) = entries.next() {
+            *pair = first;
+        }
+        if entries.next().is_some() {
+            return None;
+        }
+    }
+    Some(pairs)
 }
 
 impl<const N: usize, M, G> Bracket<M, G> for ConstantPoisson<N>
@@ -39,6 +57,9 @@ where
         _: &BracketArgs<'_, M, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
+        if let Some(pairs) = &self.pairs {
+            return Ok(SVector::from_fn(|i, _| alpha[pairs[i].0] * pairs[i].1));
+        }
         let row = |i| (0..N).fold(D::zero(), |sum, j| sum + alpha[j] * self.tensor[(i, j)]);
         Ok(SVector::from_fn(|i, _| row(i)))
     }

@@ -23,12 +23,16 @@ pub(crate) struct InPlainNumbers<'a, F: Flow> {
 }
 
 /// Writes the laws of a flow.
-fn written<L: AsRef<[f64]>>(Laws { energy, entropy, invariants }: &Laws<L>) -> Laws<Values> {
+pub(crate) fn written<L: AsRef<[f64]>>(
+    Laws { energy, entropy, invariants }: &Laws<L>,
+) -> Laws<Values> {
     Laws { energy: *energy, entropy: *entropy, invariants: Values::of(invariants.as_ref()) }
 }
 
 /// Reads the laws of a flow.
-fn typed<F: Written>(Laws { energy, entropy, invariants }: &Laws<Values>) -> Laws<F::Numbers> {
+pub(crate) fn typed<F: Written>(
+    Laws { energy, entropy, invariants }: &Laws<Values>,
+) -> Laws<F::Numbers> {
     Laws { energy: *energy, entropy: *entropy, invariants: F::numbers(invariants) }
 }
 

@@ -115,7 +115,9 @@ impl<Y: Metriplectic> StageFlow for Y {
     #[inline]
     fn motion(&self, x: &Point<Y>) -> Option<(Tangent<Y>, f64)> {
         let jets = LawJets::at(self, x);
-        if jets.is_finite() { motion(self, x, &jets.w) } else { None }
+        // A differential that is not finite is not in the velocity, or the velocity is not finite either. The end of a step asks for all.
+        let Laws { energy, entropy, .. } = jets.values;
+        if 0.0 * energy + 0.0 * entropy == 0.0 { motion(self, x, &jets.w) } else { None }
     }
 
     #[inline]

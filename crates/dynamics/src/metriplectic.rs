@@ -7,7 +7,7 @@ use crate::bracket::{Bracket, BracketArgs};
 use crate::dissipation::Dissipation;
 use crate::invariants::Invariants;
 use crate::vector_field::VectorField;
-use crate::verification::Verify;
+use crate::verification::{Begun, Verify};
 
 /// The parts of a system `x' = Π dH + K dS`, which an integrator asks for. [`System`](crate::System) is the
 /// one to build.
@@ -53,6 +53,12 @@ pub trait Metriplectic:
     #[inline]
     fn is_verified(&self) -> bool {
         false
+    }
+
+    /// Returns where a system notes that its laws have been verified for a run, if it does.
+    #[doc(hidden)]
+    fn begun(&self) -> Option<&Begun> {
+        None
     }
 
     /// Evaluates the energy `H(x)`.

@@ -8,6 +8,7 @@ use metriplectic_manifolds::{Manifold, Riemannian};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
 use crate::invariants::Invariants;
+use crate::verification::Begun;
 
 pub use crate::metriplectic::{Metriplectic, Point, SecondLaw};
 
@@ -58,6 +59,7 @@ pub struct System<M, G, B, K, H, S, L = ()> {
     tensors: Tensors<M, G, B, K>,
     fields: Fields<H, S, L>,
     second_law: SecondLaw,
+    begun: Begun,
 }
 
 // By hand, because closures have no `Debug`.
@@ -105,7 +107,7 @@ where
         if L::COUNT >= M::Dim::LEN {
             return Err(BuildError::TooManyInvariants { count: L::COUNT, dimension: M::Dim::LEN });
         }
-        Ok(Self { tensors, fields, second_law })
+        Ok(Self { tensors, fields, second_law, begun: Begun::default() })
     }
 }
 
@@ -176,9 +178,10 @@ impl<M, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
         energy: impl FnOnce(H) -> E,
         entropy: impl FnOnce(S) -> F,
     ) -> System<M, G, B, K, E, F, L> {
-        let Fields { energy: h, entropy: s, invariants } = self.fields;
+        let Self { tensors, fields, second_law, .. } = self;
+        let Fields { energy: h, entropy: s, invariants } = fields;
         let fields = Fields { energy: energy(h), entropy: entropy(s), invariants };
-        System { tensors: self.tensors, fields, second_law: self.second_law }
+        System { tensors, fields, second_law, begun: Begun::default() }
     }
 
     /// Puts parts together that belong to a system which has been checked.
@@ -189,7 +192,8 @@ impl<M, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
         second_law: SecondLaw,
     ) -> Self {
         let tensors = Tensors { manifold, metric, bracket, dissipation };
-        Self { tensors, fields: Fields { energy, entropy, invariants }, second_law }
+        let fields = Fields { energy, entropy, invariants };
+        Self { tensors, fields, second_law, begun: Begun::default() }
     }
 }
 
@@ -249,6 +253,10 @@ where
     #[inline]
     fn second_law(&self) -> SecondLaw {
         self.second_law
+    }
+
+    fn begun(&self) -> Option<&Begun> {
+        Some(&self.begun)
     }
 }
 

@@ -1,5 +1,7 @@
 //! The questions that a model answers about its laws.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use metriplectic_manifolds::Manifold;
 
 use crate::{ModelError, Report};
@@ -35,8 +37,9 @@ pub trait Verify<M: Manifold> {
     /// The errors of [`verify`](Self::verify), at `x0`.
     fn verified_as_member(&self, x0: &M::Point<f64>) -> Result<Verified<'_, Self>, ModelError>;
 
-    /// Checks what a run requires before its first step: everything that [`verify`](Self::verify) does, or
-    /// the laws at `x0` alone if the system is [`Verified`].
+    /// Checks what a run requires before its first step: everything that [`verify`](Self::verify) does. If the system is
+    /// [`Verified`], it checks the laws at `x0` alone; if a run has begun before, at `x0` with all derivatives. The tensors and the
+    /// fields are those that the first start has been verified with, so that a further one costs a few steps.
     ///
     /// # Errors
     ///
@@ -135,3 +138,25 @@ impl<Y: ?Sized> Clone for Verified<'_, Y> {
 }
 
 impl<Y: ?Sized> Copy for Verified<'_, Y> {}
+
+/// Whether the laws of a system have been verified around the start of a run of it.
+#[doc(hidden)]
+#[derive(Debug, Default)]
+pub struct Begun(AtomicBool);
+
+impl Begun {
+    pub(crate) fn has(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn note(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A copy has the same parts.
+impl Clone for Begun {
+    fn clone(&self) -> Self {
+        Self(AtomicBool::new(self.has()))
+    }
+}

@@ -9,7 +9,6 @@ mod algebra;
 mod collocation;
 mod drift;
 mod driven;
-pub(crate) mod many;
 mod metric;
 mod midpoint;
 mod motion;

@@ -52,6 +52,7 @@ pub mod run;
 pub mod step;
 pub mod system;
 pub mod tangent;
+mod typed;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};

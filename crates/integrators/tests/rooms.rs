@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 19] = [
+const ROOMS: [(&str, &[&str]); 20] = [
     ("newton", &[]),
     ("step", &["newton"]),
     ("round_off", &["step"]),
@@ -33,6 +33,7 @@ const ROOMS: [(&str, &[&str]); 19] = [
             "numbers",
         ],
     ),
+    ("typed", &["step", "discrete_gradient", "midpoint", "collocation", "numbers", "implicit"]),
     ("compiled", &["step", "explicit", "numbers", "implicit"]),
     ("run", &["step", "round_off", "numbers", "implicit", "compiled"]),
     ("noise", &["step", "explicit", "numbers"]),

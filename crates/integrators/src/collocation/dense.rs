@@ -22,7 +22,7 @@ pub(crate) struct Within<'a, F: Flow> {
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run.
-pub(super) fn between<Y: Metriplectic>(
+pub(crate) fn between<Y: Metriplectic>(
     within: &Within<'_, Y>,
     promises: Promises,
     memory: &StageMemory<Dim<Y>>,
@@ -70,7 +70,7 @@ impl<F: Flow> Within<'_, F> {
 }
 
 /// The error of a step, by a norm: the larger one of its [defects].
-pub(super) fn error<Y: Metriplectic>(
+pub(crate) fn error<Y: Metriplectic>(
     tableau: &'static Tableau,
     step: &StepEnds<'_, Y>,
     memory: &StageMemory<Dim<Y>>,

@@ -26,7 +26,7 @@ pub(crate) const RATIOS: [f64; 2] = [2.0, 0.25];
 pub(crate) const TRIALS: usize = 400;
 
 /// The step, whole or in parts.
-pub(super) fn take<Y: Metriplectic>(
+pub(crate) fn take<Y: Metriplectic>(
     tableau: &'static Tableau,
     splits: usize,
     start: &Start<'_, Y>,

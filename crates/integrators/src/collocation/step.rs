@@ -22,7 +22,7 @@ use crate::step::{
 };
 
 /// The start of a step with what earlier steps have left of the laws.
-pub(super) fn start_of<'a, Y: Metriplectic>(
+pub(crate) fn start_of<'a, Y: Metriplectic>(
     tableau: &Tableau,
     &StepStart { flow: system, x, time, values, reference, .. }: &StepStart<'a, Y>,
     h: f64,
@@ -43,7 +43,7 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
 pub(crate) const DAMPED_LAW: f64 = 0.125;
 
 /// Tries a step whole.
-pub(super) fn try_step<Y: Metriplectic>(
+pub(crate) fn try_step<Y: Metriplectic>(
     tableau: &'static Tableau,
     start: &Start<'_, Y>,
     memory: &mut StageMemory<Dim<Y>>,

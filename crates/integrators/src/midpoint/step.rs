@@ -10,10 +10,7 @@ use super::memory::MemoryOf;
 use super::scheme::Scheme;
 use super::{level, restored};
 use crate::discrete_gradient::DiscreteGradient;
-use crate::implicit::many::{self, OfFewOrMany};
-use crate::implicit::{Midpoint, MidpointNumbers};
 use crate::newton::{Inverse, Root};
-use crate::numbers::AtRunTime;
 use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
@@ -29,7 +26,7 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    type Memory = OfFewOrMany<MemoryOf<Y>, MidpointNumbers<AtRunTime>>;
+    type Memory = MemoryOf<Y>;
 
     const HAS_DEFAULT_BETWEEN: bool = true;
 
@@ -58,51 +55,23 @@ where
         &self,
         start: &StepStart<'_, Y>,
         h: f64,
-        memory: &mut Self::Memory,
+        memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, StepError> {
-        // A constant, so that only one of the two is compiled.
-        if const { Self::takes_numbers::<Y>() } {
-            return many::step(&self.in_numbers::<Y>(), start, h, memory.many());
-        }
-        self.with_halves(&Start::of(start, h), memory.few())
+        self.with_halves(&Start::of(start, h), memory)
     }
 
     fn attempt(
         &self,
         start: &StepStart<'_, Y>,
         h: f64,
-        memory: &mut Self::Memory,
+        memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, Refusal> {
-        if const { Self::takes_numbers::<Y>() } {
-            return many::attempt(&self.in_numbers::<Y>(), start, h, memory.many());
-        }
         let start = Start::of(start, h);
-        self.try_step(&start, memory.few(), Fallbacks::FirstTries).map_err(|failure| Refusal {
+        self.try_step(&start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
             effort: failure.effort,
             error: failure.cause.first_law(start.time, h),
             second_law: false,
         })
-    }
-}
-
-impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// Returns whether a system takes the steps of this scheme in plain numbers.
-    const fn takes_numbers<Y: Metriplectic>() -> bool
-    where
-        R: Retraction<Y::Manifold, Y::Metric>,
-    {
-        many::is_of_many::<Y>() && R::PATH.is_some() && W::KIND.is_some()
-    }
-
-    /// The scheme in plain numbers.
-    fn in_numbers<Y: Metriplectic>(&self) -> Midpoint
-    where
-        R: Retraction<Y::Manifold, Y::Metric>,
-    {
-        let &Self { newton, splits, .. } = self;
-        let line = R::PATH.zip(W::KIND);
-        let line = line.map(|(path, gradient)| LineOfStep { path, gradient });
-        Midpoint { name: scheme_name::<R, W>, line, newton, splits }
     }
 }
 

@@ -29,8 +29,8 @@ use crate::{
 ///     (p[0] * p[0] / inertia[0] + p[1] * p[1] / inertia[1] + p[2] * p[2] / inertia[2]) * 0.5
 /// });
 /// let at = vector![1.0, 2.0, 3.0];
-/// let recorded = energy.clone().recorded(&Euclidean::<3>, &at)?;
-/// let (plain, tape) = (energy.jet1(&at), recorded.jet1(&at));
+/// let recorded = energy.recorded(&Euclidean::<3>, &at)?;
+/// let (plain, tape) = (ScalarField::<Euclidean<3>>::jet1(&energy, &at), recorded.jet1(&at));
 /// assert!((plain.df - tape.df).norm() < 1e-15);
 /// # Ok::<(), metriplectic_recording::RecordingError>(())
 /// ```
@@ -214,5 +214,33 @@ where
     #[inline]
     fn at_real(&self, x: &M::Point<Real>) -> Form<M, Real> {
         (self.closure)(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::Vector1;
+
+    use super::*;
+
+    #[test]
+    fn a_tape_that_is_not_its_closure_is_refused() {
+        let differing = |part: f64| {
+            let field = Recordable::new(
+                move |x: &Vector1<Real>| x[0] * x[0] * (1.0 + part),
+                |x: &Vector1<Recorded>| x[0] * x[0],
+            );
+            field.recorded(&Euclidean::<1>, &Vector1::new(3.0)).map(|_| ())
+        };
+        assert_eq!(differing(0.0), Ok(()));
+        assert_eq!(differing(0.5e-10), Ok(()));
+        assert!(matches!(
+            differing(2e-10),
+            Err(RecordingError::Disagrees { quantity: "value", .. })
+        ));
+        // Not a number on both sides is no difference.
+        let root = crate::field!(|x: &Vector1<Real>| num_dual::DualNum::sqrt(&x[0]));
+        assert!(root.recorded(&Euclidean::<1>, &Vector1::new(-1.0)).is_ok());
     }
 }

@@ -159,7 +159,6 @@ fn agree<M: PointEntries>(
     let one = |quantity, recorded: f64, closure: f64, size: f64| {
         let is_same = recorded.to_bits() == closure.to_bits()
             || (recorded.is_nan() && closure.is_nan())
-            || recorded == closure
             || (recorded - closure).abs() <= AGREEMENT * size;
         if is_same {
             Ok(())

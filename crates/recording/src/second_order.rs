@@ -328,7 +328,7 @@ impl SecondOrder<'_> {
                     for (k, local) in self.locals.iter().enumerate().rev() {
                         let (w, dw) = (self.weights[n + k], bar[n + k]);
                         // As in a sweep back: what nobody reads contributes nothing.
-                        if w != 0.0 || dw != [0.0; L] {
+                        if w != 0.0 || dw.iter().any(|dw| *dw != 0.0) {
                             local.pull_back(w, &dw, t, bar);
                         }
                     }

@@ -1,4 +1,5 @@
 //! Recordings: the text of ordinary closures, what cannot be recorded, and fields on the spaces of the library.
+#![expect(clippy::float_cmp, reason = "the numbers are compared to the bit")]
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -36,7 +37,7 @@ fn check<M: PointEntries>(space: &M, tape: &TapeField<M>, closure: &impl ScalarF
         let mut entries = M::entries(&x).into_iter();
         M::list(&x, &mut |entry| assert_eq!(Some(entry), entries.next()));
         let mut entries = M::entries(&x).into_iter();
-        assert_eq!(M::point(&mut || entries.next().unwrap()), x);
+        assert_eq!(M::point(&mut || entries.next().expect("as many")), x);
         assert_eq!(M::entries(&x).len(), M::COUNT);
     }
 }

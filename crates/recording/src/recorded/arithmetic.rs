@@ -158,7 +158,6 @@ impl<'a> Product<&'a Self> for Recorded {
 
 const COMPARISON: &str = "a comparison";
 
-#[expect(clippy::float_cmp, reason = "the function asks for equal values")]
 impl PartialEq for Recorded {
     #[track_caller]
     fn eq(&self, other: &Self) -> bool {
@@ -166,7 +165,6 @@ impl PartialEq for Recorded {
     }
 }
 
-#[expect(clippy::float_cmp, reason = "the function asks for equal values")]
 impl PartialEq<f64> for Recorded {
     #[track_caller]
     fn eq(&self, other: &f64) -> bool {

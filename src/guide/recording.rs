@@ -30,7 +30,7 @@
 //! let span = Span::steps(0.05, 40);
 //! let a = DormandPrince8.run(&recorded, start, span)?;
 //! let b = DormandPrince8.run(&plain, start, span)?;
-//! assert!((a.last() - b.last()).norm() < 1e-13);
+//! assert!((a.last().point - b.last().point).norm() < 1e-13);
 //! # Ok(())
 //! # }
 //! ```

@@ -65,6 +65,7 @@
 //! | [`Lattice`](lattices::Lattice) | many sites, from closures of a site and of a bond | [`lattices`] |
 //! | [`Method`](integrators::Method) | a one-step method, such as [`Scheme`](integrators::Scheme) | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
+//! | [`field!`](recording::field) | a closure that can be recorded, for gradients by one sweep back | [`recording`] |
 //! | [`Sweep`](ensembles::Sweep) | many runs, in one table | [`ensembles`] |
 //! | [`Trajectory`](integrators::Trajectory) | the steps of a run, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
 
@@ -80,6 +81,7 @@ pub use metriplectic_fitting as fitting;
 pub use metriplectic_integrators as integrators;
 pub use metriplectic_lattices as lattices;
 pub use metriplectic_manifolds as manifolds;
+pub use metriplectic_recording as recording;
 pub use nalgebra;
 
 /// Everything that a program usually needs.
@@ -116,6 +118,7 @@ pub mod prelude {
         LieAlgebra, LieDual, Manifold, Metric, Product, Projection, Retraction, Rotations, Sphere,
         WeylMidpoint,
     };
+    pub use metriplectic_recording::{Branchless, RecordedField, field};
     /// The linear algebra of this library; its macros, such as `vector!`, look for it under this name.
     pub use nalgebra;
     pub use nalgebra::{

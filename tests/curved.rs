@@ -10,7 +10,8 @@ use metriplectic::equations::{
 use metriplectic::equations::{ByCharts, Path};
 use metriplectic::fields::Space as _;
 use metriplectic::integrators::{
-    Entries, FromEquations, ItohAbe, Method, NoImplicitSteps, Schedule, SymmetricItohAbe,
+    Entries, Flow as _, FromEquations, ItohAbe, Method, NoImplicitSteps, OpenEquations, Schedule,
+    SymmetricItohAbe, Vector as _,
 };
 use metriplectic::prelude::*;
 
@@ -254,6 +255,35 @@ fn a_system_with_charts_of_its_own_has_implicit_steps() {
     println!("{off:?}");
     // The displacement of a step has twelve digits.
     assert!(off.iter().all(|off| *off < 1e-10), "{off:?}");
+    // Derivatives, in the frames of the charts of the user.
+    let turned = |x: &[f64]| {
+        let n = spin(x).0;
+        nalgebra::DMatrix::from_fn(3, 3, |i, k| {
+            let mut y = [0.0; 4];
+            Spin.chart(
+                x,
+                &std::array::from_fn::<_, 3, _>(|j| if j == k { 0.1 } else { 0.0 }),
+                &mut y,
+            );
+            // Both charts of the sphere are geodesics.
+            let q = Sphere::<2>::coordinates(&n, &spin(&y).0);
+            let q = [q[0], q[1], y[3] - x[3]];
+            q[i] / 0.1
+        })
+    };
+    macro_rules! off {
+        ($method:expr) => {{
+            let typed = $method.tangent(&typed, x, Span::steps(0.1, 10)).unwrap().last().matrix();
+            let run = $method.tangent(&own, entries.clone().into(), Span::steps(0.1, 10)).unwrap();
+            let (found, end) = (run.last().matrix(), &run.last().point);
+            let exact = turned(end).transpose() * typed * turned(&entries);
+            (found - &exact).amax() / exact.amax()
+        }};
+    }
+    let off = [off!(DormandPrince8), off!(chart), off!(Gauss::<2>), off!(Radau::<2>)];
+    println!("derivatives: {off:?}");
+    // Nine digits: the charts are known by their values alone.
+    assert!(off.iter().all(|off| *off < 4e-9), "{off:?}");
     // An entropy near zero costs no digits of the spin.
     for small in [1e-9, 1e-15] {
         let (x, entries) = ((vector![0.6, 0.0, 0.8], vector![small]), vec![0.6, 0.0, 0.8, small]);
@@ -263,14 +293,12 @@ fn a_system_with_charts_of_its_own_has_implicit_steps() {
         let off = (0..3).map(|i| (n[i] - end[i]).abs()).fold((s.x - end[3]).abs(), f64::max);
         assert!(off < 1e-10, "{small}: {off:.1e}");
     }
-    // Across the antipode a chart does not reach: no step leads there, as for a system in its types.
-    let fast = |h| chart.run(&own, entries.clone().into(), Span::steps(h, 1));
+    // Long steps stay on this side of the antipode, as those of the system in its types do.
     for h in [2.0, 6.0, 9.0] {
-        if let Ok(run) = fast(h) {
-            let typed = chart.run(&typed, x, Span::steps(h, 1)).unwrap();
-            let off = (0..3).map(|i| (typed.last().point.0[i] - run.last().point[i]).abs());
-            assert!(off.fold(0.0, f64::max) < 1e-9, "{h}");
-        }
+        let run = chart.run(&own, entries.clone().into(), Span::steps(h, 1)).unwrap();
+        let typed = chart.run(&typed, x, Span::steps(h, 1)).unwrap();
+        let off = (0..3).map(|i| (typed.last().point.0[i] - run.last().point[i]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{h}");
     }
     // Geodesics are not known.
     let error = WeylMidpoint.run(&own, entries.into(), span()).unwrap_err();
@@ -298,17 +326,24 @@ macro_rules! orders {
     }};
 }
 
-#[test]
-fn a_system_with_charts_of_its_own_is_driven() {
-    let own = FromEquations(Differences(Spin))
+/// The spin of charts of its own, which a field turns, in air.
+fn driven_spin(strength: f64, friction: f64) -> OpenEquations<Differences<Spin>> {
+    FromEquations(Differences(Spin))
         .opened()
-        .work("field", |t, x, v| {
+        .work("field", move |t, x, v| {
             let (n, _) = spin(x);
-            let turned = n.cross(&vector![0.0, (2.0 * t).sin() * 0.5, 0.2]);
+            let turned = n.cross(&vector![0.0, (2.0 * t).sin() * strength, 0.2]);
             let [a, b] = frame(n).map(|e| e.dot(&turned));
             v.copy_from_slice(&[a, b, 0.0]);
         })
-        .bath("air", 0.5, |_, contact| (0..2).for_each(|axis| contact(0.2, &[(axis, 1.0)])));
+        .bath("air", 0.5, move |_, contact| {
+            (0..2).for_each(|axis| contact(friction, &[(axis, 1.0)]));
+        })
+}
+
+#[test]
+fn a_system_with_charts_of_its_own_is_driven() {
+    let own = driven_spin(0.5, 0.2);
     let start = own.start(vec![0.6, 0.0, 0.8, 0.2]);
     type State = OpenState<Entries>;
     let distance = |a: &State, b: &State| {
@@ -323,6 +358,184 @@ fn a_system_with_charts_of_its_own_is_driven() {
         Scheme::new(ChartMidpoint) => 2.0,
         Gauss::<2> => 4.0,
     }
+}
+
+#[test]
+fn a_driven_system_with_charts_of_its_own_has_tangents() {
+    let systems = Systems::new(["strength", "friction"], |t: &Vector2<f64>| {
+        Ok::<_, Error>(driven_spin(t.x, t.y))
+    });
+    let theta = vector![0.5, 0.2];
+    let own = systems.at(theta).unwrap();
+    let (entries, span) = ([0.6, 0.0, 0.8, 0.2], Span::steps(0.1, 3));
+    macro_rules! compare {
+        ($($method:expr),+) => {$({
+            let run = $method.tangent(&own, own.start(entries), span).unwrap();
+            let (end, found) = (&run.last().point, run.last().matrix());
+            // Three directions, the clock, the works and heats, and the parameters.
+            assert_eq!(found.shape(), (8, 10));
+            let last = |theta: Vector2<f64>, q: [f64; 3]| {
+                let own = systems.build(&theta).unwrap();
+                let mut x = [0.0; 4];
+                Spin.chart(&entries, &q, &mut x);
+                let run = $method.run(&own, own.start(x), span).unwrap();
+                let d = own.displacement(end, &run.last().point).unwrap();
+                nalgebra::DVector::from_vec(d.to_list())
+            };
+            let column = |k: usize| {
+                let at = |e: f64| match k {
+                    0..3 => last(theta, std::array::from_fn(|i| if i == k { e } else { 0.0 })),
+                    _ => last(theta + Vector2::ith(k - 3, e), [0.0; 3]),
+                };
+                let slope = |e: f64| (at(e) - at(-e)) / (2.0 * e);
+                (slope(1e-4) * 4.0 - slope(2e-4)) / 3.0
+            };
+            for (k, place) in [0, 1, 2, 8, 9].into_iter().enumerate() {
+                let (exact, found) = (column(k), found.column(place).rows(0, 8).into_owned());
+                let off = (&found - &exact).amax() / exact.amax();
+                println!("{}, {k}: {off:.1e}", stringify!($method));
+                assert!(off < 1e-7, "{}, {k}: {off:e}\n{found}\n{exact}", stringify!($method));
+            }
+        })+};
+    }
+    compare!(DormandPrince8, Scheme::new(ChartMidpoint));
+}
+
+/// A free particle, `H = ½p²`, before a wall at `q = 1`, in charts that are translations.
+struct Wall {
+    /// Whether the wall is the edge of the domain; else charts do not see past half of the way to it.
+    is_edge: bool,
+}
+
+impl Equations for Wall {
+    fn sizes(&self) -> Sizes {
+        Sizes { entries: 2, directions: 2, laws: 2 }
+    }
+
+    fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+        values.copy_from_slice(&[0.5 * x[1] * x[1], 0.0]);
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.values(t, x, values);
+        w.copy_from_slice(&[0.0, x[1], 0.0, 0.0]);
+    }
+
+    fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        v.copy_from_slice(&[x[1], 0.0]);
+        Some(0.0)
+    }
+
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        sizes.copy_from_slice(&[1.0, x[1].abs()]);
+    }
+
+    fn defect(&self, x: &[f64]) -> f64 {
+        if self.is_edge && x[0] >= 1.0 { f64::INFINITY } else { 0.0 }
+    }
+
+    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&[x[0] + q[0], x[1] + q[1]]);
+    }
+
+    fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
+        q.copy_from_slice(&[y[0] - x[0], y[1] - x[1]]);
+        self.is_edge || q[0].abs() < 0.5 * (1.0 - x[0])
+    }
+}
+
+impl Apart for Wall {
+    fn is_zero(&self, part: Part) -> bool {
+        part != Part::Reversible
+    }
+
+    fn apply(&self, _: Part, _: f64, _: &[f64], _: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
+        v.copy_from_slice(&[alpha[1], -alpha[0]]);
+    }
+
+    fn has_charts(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn no_driven_step_leads_beyond_the_charts_or_the_domain() {
+    for is_edge in [true, false] {
+        let own =
+            FromEquations(Differences(Wall { is_edge }))
+                .opened()
+                .bath("air", 0.5, |_, contact| contact(0.01, &[(1, 1.0)]));
+        let start = || own.start([0.0, 1.0]);
+        macro_rules! check {
+            ($($method:expr),+) => {$(
+                let name = stringify!($method);
+                let before = $method.run(&own, start(), Span::steps(0.3, 2)).unwrap();
+                assert!(before.last().point.x[0] > 0.5 && before.last().point.x[0] < 0.7, "{name}");
+                let error = $method.run(&own, start(), Span::steps(0.3, 6)).unwrap_err();
+                println!("{name}: {error}");
+                let RunError::Step { cause, .. } = error else { panic!("{name}: {error}") };
+                let time = match cause {
+                    StepError::OutOfDomain { time, .. } | StepError::NotConverged { time, .. } => time,
+                    other => panic!("{name}: {other}"),
+                };
+                // The wall is reached at the time 1.005.
+                assert!(time < 1.0, "{name}: {time}");
+            )+};
+        }
+        check!(Gauss::<2>, Gauss::<3>, Radau::<2>, Scheme::new(ChartMidpoint));
+    }
+}
+
+/// A vector space with more entries than directions.
+struct Constrained;
+
+impl Equations for Constrained {
+    fn sizes(&self) -> Sizes {
+        Sizes { entries: 3, directions: 2, laws: 2 }
+    }
+
+    fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+        values.copy_from_slice(&[0.5 * (x[0] * x[0] + x[1] * x[1]), 0.0]);
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.values(t, x, values);
+        w.copy_from_slice(&[x[0], x[1], 0.0, 0.0]);
+    }
+
+    fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        v.copy_from_slice(&[x[1], -x[0]]);
+        Some(0.0)
+    }
+}
+
+impl Apart for Constrained {
+    fn is_zero(&self, part: Part) -> bool {
+        part != Part::Reversible
+    }
+
+    fn apply(&self, _: Part, _: f64, _: &[f64], _: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
+        v.copy_from_slice(&[alpha[1], -alpha[0]]);
+    }
+}
+
+#[test]
+fn a_vector_space_with_more_entries_than_directions_has_no_implicit_steps() {
+    let own = FromEquations(Differences(Constrained));
+    let open = FromEquations(Differences(Constrained)).opened();
+    let expected = NoImplicitSteps::Charts { entries: 3, directions: 2 };
+    macro_rules! check {
+        ($($method:expr),+) => {$(
+            let x = [0.6, 0.8, 0.0];
+            let closed = $method.run(&own, x.into(), Span::steps(0.1, 2)).unwrap_err();
+            let RunError::Method(closed) = closed else { panic!("{closed}") };
+            let opened = $method.run(&open, open.start(x), Span::steps(0.1, 2)).unwrap_err();
+            let RunError::Method(opened) = opened else { panic!("{opened}") };
+            let refused = [closed, opened].map(|error| error.downcast_ref().copied());
+            assert_eq!(refused, [Some(expected); 2]);
+        )+};
+    }
+    check!(WeylMidpoint, Scheme::new(ChartMidpoint), Gauss::<2>);
 }
 
 type SpinAt<T> = (Vector3<T>, Vector1<T>);

@@ -492,6 +492,105 @@ fn a_system_of_ones_own_is_fitted_by_every_kind_of_method_in_any_unit() {
 }
 
 #[test]
+fn a_system_of_ones_own_in_surroundings_is_fitted_with_its_ledger() {
+    let count = 3;
+    let row = |t: &Vector3<f64>| {
+        let (push, friction) = (t.y, t.z);
+        let row = FromEquations(Differences(Row { count, stiffness: t.x }));
+        let row = row.opened().work("motor", move |t, _, v| v[count] = push * (1.3 * t).sin());
+        Ok::<_, Error>(row.bath("air", 0.7, move |_, contact| {
+            (count..2 * count).for_each(|p| contact(friction, &[(p, 1.0)]));
+        }))
+    };
+    let start = row(&vector![1.6, 0.4, 0.1]).unwrap().start([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+    let case = Case {
+        names: ["stiffness", "push", "friction"],
+        truth: vector![1.6, 0.4, 0.1],
+        guess: vector![1.5, 0.5, 0.15],
+        times: &every(0.7, 10),
+        observe: |x: &OpenState<Entries>| {
+            vector![x.x[0], x.x[2], x.ledger.heat("air").unwrap_or(f64::NAN)]
+        },
+        start,
+        noise: 1e-3,
+    };
+    finds(&case, &row, &DormandPrince8, Span::until(7.0).tolerance(1e-7));
+    finds(&case, &row, &Gauss::<2>, Span::steps(0.1, 70));
+    finds(&case, &row, &Radau::<2>, Span::until(7.0).tolerance(1e-6));
+    finds(&case, &row, &Scheme::new(WeylMidpoint), Span::steps(0.1, 70));
+}
+
+/// The strength of a port and the friction of a bath of a family, from places and heat with noise.
+#[test]
+fn a_family_with_surroundings_is_fitted_as_it_is() {
+    let pushed = Family::on(Euclidean::<2>)
+        .parameters(["stiffness", "push", "friction"])
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>, t: &Vector3<Real>| (x.y * x.y + x.x * x.x * t.x) * 0.5)
+        .work("motor", |time: Real, _: &Vector2<Real>, t: &Vector3<Real>| {
+            vector![0.0.into(), (time * 1.3).sin() * t.y]
+        })
+        .bath("air", |t: &Vector3<f64>| {
+            let rate = Real::from(t.z);
+            Bath::at(0.7).friction(move |_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate, along: Vector2::<Real>::y() }]
+            })
+        })
+        .build()
+        .unwrap();
+    let (truth, guess) = (vector![1.5, 0.4, 0.1], vector![1.4, 0.5, 0.2]);
+    let (times, sigma, mut noise) = (every(0.5, 30), 1e-3, normal(5));
+    let span = || Span::until(15.0).tolerance(1e-8);
+    let (system, start) = (pushed.at(truth), vector![1.0, 0.0]);
+    let start = system.start(start);
+    let observe =
+        |s: &OpenState<Vector2<f64>>| vector![s.x.x, s.ledger.heat("air").unwrap_or(f64::NAN)];
+    let run = DormandPrince8.run(&system, start.clone(), span().output_at(times.clone())).unwrap();
+    let data: Vec<_> = run.states()[1..]
+        .iter()
+        .map(|state| observe(&state.point) + Vector2::from_fn(|_, _| sigma * noise()))
+        .collect();
+    let fit = Fit::of(&pushed)
+        .observe(observe)
+        .data(&times, &data)
+        .positive(["friction"])
+        .start_at(start.clone())
+        .run(DormandPrince8, span(), guess)
+        .unwrap();
+    println!("{fit}");
+    for (estimate, truth) in fit.estimates.iter().zip(&truth) {
+        let off = (estimate.value - truth).abs() / estimate.standard_error;
+        assert!(off < 3.5 && estimate.standard_error < 0.01 * truth, "{fit}");
+    }
+    assert!((0.7..1.3).contains(&(fit.noise / sigma)), "{fit}");
+    let build = |t: &Vector3<f64>| Ok::<_, Error>(pushed.at(*t).into_system());
+    let by_closure = Fit::of_systems(*pushed.names(), build)
+        .observe(observe)
+        .data(&times, &data)
+        .positive(["friction"])
+        .start_at(start.clone())
+        .run(DormandPrince8, span(), guess)
+        .unwrap();
+    assert_eq!(fit.parameters, by_closure.parameters);
+    // The gradient of a loss, and the fit is where it vanishes.
+    let term = |_, k: usize, x: &OpenState<Vector2<f64>>| {
+        (observe(x) - data[k]).norm_squared() * 0.5 / (sigma * sigma)
+    };
+    let loss = Loss::of(&pushed)
+        .starts(std::slice::from_ref(&start))
+        .times(&times)
+        .term(term)
+        .over(DormandPrince8, span());
+    let in_errors = |theta: Vector3<f64>| {
+        let (_, slope) = loss.gradient_at(&theta).unwrap();
+        slope.iter().zip(&fit.estimates).map(|(g, e)| (g * e.standard_error).abs()).sum::<f64>()
+    };
+    let [at_guess, at_best] = [guess, Vector3::from_column_slice(&fit.parameters)].map(in_errors);
+    println!("{at_guess} {at_best}");
+    assert!(at_best < 0.2 && at_guess > 3.0, "{at_best} {at_guess}");
+}
+
+#[test]
 fn a_gradient_by_differences_is_the_one_by_the_adjoint() {
     let family = rotors!();
     let (theta, times) = (vector![3.0, 2.0, 0.05], [2.0, 5.0, 9.0]);

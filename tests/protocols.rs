@@ -393,6 +393,57 @@ fn a_run_of_ones_own_that_is_put_down_goes_on_with_the_same_bits() {
     assert!(verified.report(&verified.start(ONE.start(&GENERIC))).verdict.is_ok());
 }
 
+/// Compares the tangents of two masses in plain numbers with those of the typed system: of the state and the ledger, along the start,
+/// the clock and the parameters, forwards and backwards.
+#[test]
+fn tangents_of_ones_own_in_surroundings_are_those_of_a_typed_system() {
+    let world = |t: &Vector2<f64>| World { drive: t.x, air: t.y, ..ONE };
+    let typed = Systems::new(["drive", "air"], |t: &Vector2<f64>| Ok::<_, Error>(typed!(world(t))));
+    let own = Systems::new(["drive", "air"], |t: &Vector2<f64>| {
+        Ok::<_, Error>(surrounded(Differences(chain(2, world(t))), world(t)))
+    });
+    let theta = vector![1.0, 0.08];
+    let (a, own) = (typed.at(theta).unwrap(), own.at(theta).unwrap());
+    let start = ONE.start(&GENERIC);
+    macro_rules! compare {
+        ($($method:expr),+) => {$({
+            let (name, span) = (stringify!($method), Span::steps(0.1, 3));
+            let typed = $method.tangent(&a, a.start(X::from_column_slice(&start)), span).unwrap();
+            let run = $method.tangent(&own, own.start(start.clone()), span).unwrap();
+            let plain = $method.run(&own, own.start(start.clone()), span).unwrap();
+            assert!(plain.last().point == run.last().point, "{name}: the tangent changed the run");
+            let (exact, found) = (typed.last().matrix(), run.last().matrix());
+            // Six entries, the clock, six columns of the ledger, and the parameters.
+            assert_eq!(found.shape(), (13, 15));
+            let off = (&found - &exact).amax() / exact.amax();
+            // Along the start without its parameters, too.
+            let alone = $method.tangent(&*own, own.start(start.clone()), span).unwrap();
+            let without = alone.last().matrix();
+            let apart = (found.columns(0, 13) - &without).amax() / exact.amax();
+            let heats = ["air", "oven"].map(|bath| {
+                let [a, b] = [typed.last().heat_along(bath), run.last().heat_along(bath)];
+                let (a, b) = (a.unwrap(), b.unwrap());
+                assert!(a[14].abs() > 1e-5, "{name}: {a}");
+                (a - b).amax()
+            });
+            let row = nalgebra::DVector::from_fn(13, |i, _| (1.0 + i as f64).sin());
+            let back = $method.adjoint(&own, own.start(start.clone()), span).unwrap();
+            let mut rows = vec![nalgebra::DVector::zeros(13); back.states().len()];
+            rows[3] = row.clone();
+            let gradient = back.pull_back(&rows).unwrap();
+            let forward = run.last().derivative_of(&row);
+            let transposed = (gradient.along_parameters() - forward.rows(13, 2)).amax()
+                .max((gradient.along_start() - forward.rows(0, 13)).amax());
+            println!("{name}: {off:.1e} {apart:.1e} {heats:?} {transposed:.1e}, {}", run.sensitivity());
+            assert!(off < 1e-8 && apart < 1e-8, "{name}: {off:e} {apart:e}\n{found:.7}\n{exact:.7}");
+            assert!(heats.iter().all(|off| *off < 1e-8), "{name}: {heats:?}");
+            assert!(transposed < 1e-7, "{name}: {transposed:e}");
+            assert!(run.sensitivity().energy < 1e-8, "{name}: {}", run.sensitivity());
+        })+};
+    }
+    compare!(WeylMidpoint, Gauss::<2>, DormandPrince8);
+}
+
 /// An oscillator that rubs on a body, which conducts heat to another one: `H = ½q² + ½p² + Σ (u + ¼u²)`, `S = Σ ln u`.
 #[derive(Clone, Copy)]
 struct Rubbing {
@@ -537,6 +588,103 @@ fn a_path_of_ones_own_is_that_of_a_typed_system() {
     assert!(matches!(off, NoiseError::TermsOff { .. }), "{off}");
     let fewer = refused(Rubbing { listed: 1, ..RUBBING });
     assert_eq!(fewer, NoiseError::BadTerms { found: 1, expected: 2, directions: 4 });
+}
+
+#[test]
+fn a_path_of_ones_own_in_baths_is_that_of_a_typed_system() {
+    let start = [0.7, -0.4, 0.9, 1.3];
+    let tensor =
+        matrix![0.0, 1.0, 0.0, 0.0; -1.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0];
+    let heat = |u: Real| u + u * u * 0.25;
+    let push = |t: Real| (t * 1.7).sin() * 0.6;
+    let typed = System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(tensor).unwrap())
+        .energy(move |x: &Vector4<Real>| (x.x * x.x + x.y * x.y) * 0.5 + heat(x.z) + heat(x.w))
+        .entropy(|x: &Vector4<Real>| x.z.ln() + x.w.ln())
+        .dissipation(OnsagerDissipation(|x: &Vector4<Real>, w: &Vector4<Real>| {
+            let o = Real::from(0.0);
+            [
+                Contact { rate: x.z * 0.3, along: vector![o, w.z, -w.y, o] },
+                Contact { rate: x.z * x.w * 0.2, along: vector![o, o, w.w, -w.z] },
+            ]
+        }))
+        .work("motor", move |t: Real, _: &Vector4<Real>| Vector4::ith(1, push(t)))
+        .bath(
+            "air",
+            Bath::in_time(|t: Real| t * 0.2 + 0.8).friction(
+                |_: Real, x: &Vector4<Real>, _: &Vector4<Real>| {
+                    let (rate, o) = (x.y * x.y * 0.2 + 0.3, Real::from(0.0));
+                    [
+                        Contact { rate, along: vector![o, x.x * 0.1 + 1.0, o, o] },
+                        Contact { rate: x.z * 0.2, along: vector![o, o, x.z, o] },
+                    ]
+                },
+            ),
+        )
+        .bath(
+            "oven",
+            Bath::at(1.2).friction(|_: Real, _: &Vector4<Real>, w: &Vector4<Real>| {
+                [Contact { rate: w.w * 0.1, along: Vector4::<Real>::w() }]
+            }),
+        )
+        .noise(Boltzmann(0.05))
+        .build()
+        .unwrap();
+    let open = || {
+        FromEquations(Differences(RUBBING))
+            .opened()
+            .work("motor", move |t, _, v| v[1] = push(t.into()).re)
+            .bath(
+                "air",
+                |t: Real| t * 0.2 + 0.8,
+                |at, contact| {
+                    contact(0.3 + 0.2 * at.x[1] * at.x[1], &[(1, 1.0 + 0.1 * at.x[0])]);
+                    contact(0.2 * at.x[2], &[(2, at.x[2])]);
+                },
+            )
+            .bath("oven", 1.2, |at, contact| contact(0.1 * at.w[3], &[(3, 1.0)]))
+    };
+    let own = open().with_noise(Boltzmann(0.05), &[2, 1]);
+    let span = || Span::steps(0.02, 50);
+    macro_rules! compare {
+        ($($method:expr),+) => {$(
+            let name = stringify!($method);
+            let x0 = typed.flow().start(Vector4::from(start));
+            let reference = $method.run(&typed, x0, span()).unwrap();
+            let run = $method.run(&own, own.flow().start(start), span()).unwrap();
+            assert!(run.certificate().keeps_energy(), "{name}: {}", run.certificate());
+            let numbers = |x: &[f64], l: &Ledger| {
+                let booked = [l.work("motor"), l.heat("air"), l.heat("oven"), l.bath_entropy("air")];
+                [x, &booked.map(Option::unwrap)].concat()
+            };
+            let [a, b] = [&reference.last().point, &typed.flow().start(Vector4::from(start))]
+                .map(|state| numbers(state.x.as_slice(), &state.ledger));
+            let end = &run.last().point;
+            let (off, moved) = (distance(&a, &numbers(&end.x, &end.ledger)), distance(&a, &b));
+            println!("{name}: {off:.1e} of {moved:.1e}");
+            // The kinetic drift is formed by differences.
+            assert!(off < 1e-9 && moved > 0.1, "{name}: {off:.1e} of {moved:.1e}");
+        )+};
+    }
+    compare!(
+        RandomFlow(WeylMidpoint).seed(3),
+        RandomFlow(Gauss::<2>).seed(3),
+        RandomFlow(DormandPrince5).seed(3),
+        NinomiyaVictoir(DormandPrince5).seed(3)
+    );
+    let refused = |contacts: &[usize]| {
+        let noisy = open().with_noise(Boltzmann(0.05), contacts);
+        let x0 = noisy.flow().start(start);
+        match RandomFlow(DormandPrince5).seed(1).run(&noisy, x0, span()) {
+            Err(RunError::Flow(error)) => *error.downcast_ref::<NoiseError>().expect("of noise"),
+            other => panic!("{:?}", other.map(|run| run.certificate().to_string())),
+        }
+    };
+    assert_eq!(refused(&[2]), NoiseError::OtherBaths { found: 2, expected: 1 });
+    let other = NoiseError::OtherContacts { bath: 1, found: 1, expected: 2 };
+    assert_eq!(refused(&[2, 2]), other);
+    let x0 = own.flow().start(start);
+    own.verified(&x0).unwrap();
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Tangents of systems in plain numbers: against those of the same systems in types, and against differences of runs.
 
+use metriplectic::dynamics::bracket::Zero;
 use metriplectic::dynamics::{InNumbers, Point};
 use metriplectic::equations::{
     Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, SecondLaw, Sizes,
 };
 use metriplectic::integrators::{Entries, FromEquations, LinearisedAlong, Schedule};
 use metriplectic::prelude::*;
-use nalgebra::{DMatrix, DVector, vector};
+use nalgebra::{DMatrix, DVector, matrix, vector};
 
 use crate::off;
 
@@ -87,6 +88,52 @@ fn tangents_in_numbers_are_those_in_types() {
     // Other steps follow the same tolerance.
     let error = agrees("a body, followed", &body, DormandPrince8, &x, &followed);
     assert!(error < 1e-6, "{error:e}");
+}
+
+/// Friction is kept off a further invariant in the metric of the system, which is not the canonical one: by differences of steps, against
+/// the exact derivatives of the same steps in types and against differences of runs.
+#[test]
+fn explicit_tangents_know_the_metric_in_which_friction_keeps_an_invariant() {
+    let g = matrix![
+        2.0, 0.4, 0.0, 0.1;
+        0.4, 1.0, 0.2, 0.0;
+        0.0, 0.2, 0.5, 0.1;
+        0.1, 0.0, 0.1, 1.5
+    ];
+    let system = System::on(Euclidean::<4>)
+        .metric(Metric::constant(g).unwrap())
+        .bracket(Zero)
+        .energy(|x: &Vector4<Real>| x.x * x.x * 0.5 + x.y.powi(4) * 0.3 + x.z * x.w + x.w)
+        .entropy(|x: &Vector4<Real>| x.z - x.x * x.y * 0.3 + x.w * x.w * 0.2)
+        .casimir(|x: &Vector4<Real>| x.x + x.y * x.y * 0.5 + x.z * 0.3)
+        .build()
+        .unwrap();
+    let numbers = FromEquations(InNumbers(&system));
+    let (x, span) = (vector![0.4, -1.0, 0.3, 0.7], Span::steps(0.02, 10));
+    macro_rules! compare {
+        ($($method:expr),+) => {$({
+            let run = $method.tangent(&system, x, span).unwrap();
+            let start = Entries::from(x.as_slice());
+            let again = $method.tangent(&numbers, start.clone(), span).unwrap();
+            let (exact, found) = (run.last().matrix(), again.last().matrix());
+            let (error, moved) = (off(&found, &exact), (&exact - DMatrix::identity(4, 4)).amax());
+            let column = |k: usize| {
+                let at = |e: f64| {
+                    let mut start = start.clone();
+                    start[k] += e;
+                    let end = $method.run(&numbers, start, span).unwrap().last().point.clone();
+                    DVector::from_column_slice(&end)
+                };
+                (at(1e-5) - at(-1e-5)) / 2e-5
+            };
+            let runs = DMatrix::from_columns(&[0, 1, 2, 3].map(column));
+            let of_runs = off(&found, &runs);
+            println!("{}: {error:.1e}, of runs {of_runs:.1e}", stringify!($method));
+            assert!(moved > 0.05, "{exact}");
+            assert!(error < 1e-9 && of_runs < 1e-8, "{error:e} {of_runs:e}\n{found}\n{exact}");
+        })+};
+    }
+    compare!(DormandPrince8, DormandPrince5, RungeKuttaChebyshev);
 }
 
 /// A row of `n` masses between springs, whose friction heats one bath: `q_i' = p_i`, `p_i' = −∂V − γ p_i`, `u' = γ Σ p_i²`, with `S = ln u`. Its

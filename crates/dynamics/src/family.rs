@@ -144,8 +144,7 @@ where
 /// A model with parameters, whose systems have tangents; what a fit asks for.
 #[diagnostic::on_unimplemented(
     message = "the members of `{Self}` have no exact derivatives",
-    note = "a family with ports, baths, an energy that depends on time, or noise is fitted by `Fit::of_systems`, with the closure \
-            `|t| Ok::<_, Error>(family.at(*t).into_system())`"
+    note = "`Fit::of` and `Loss::of` take a family with ports, baths, an energy that depends on time, or noise, too"
 )]
 pub trait Parametrised<const P: usize> {
     /// The system at one `θ`.

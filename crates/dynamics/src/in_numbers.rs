@@ -2,8 +2,8 @@
 
 use metriplectic_equations::judge::coordinate_scales;
 use metriplectic_equations::{
-    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, Path, PathAt,
-    PathSlopes, Paths, PointError, SecondLaw, Sizes,
+    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, Path, Paths,
+    PointError, SecondLaw, Sizes,
 };
 use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{
@@ -735,67 +735,13 @@ impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
     fn on_manifold(&self) -> PathsInNumbers<'_, Of<Y>, Y::Metric> {
         PathsInNumbers::new(self.0.metric())
     }
-}
 
-impl<Y: Metriplectic + ?Sized> Paths for InNumbers<'_, Y> {
-    fn follows(&self, path: Path) -> bool {
-        self.on_manifold().follows(path)
-    }
-
-    fn path(
-        &self,
-        path: Path,
-        x: &[f64],
-        u: &[f64],
-        to: &mut PathAt<'_>,
-    ) -> Result<(), MetricError> {
-        self.on_manifold().path(path, x, u, to)
-    }
-
-    fn path_jet(
-        &self,
-        path: Path,
-        x: &[f64],
-        u: &[f64],
-        to: (&mut PathAt<'_>, &mut PathSlopes<'_>),
-    ) -> Result<(), MetricError> {
-        self.on_manifold().path_jet(path, x, u, to)
-    }
-
-    fn end(&self, path: Path, x: &[f64], u: &[f64], end: &mut [f64]) -> Result<(), MetricError> {
-        self.on_manifold().end(path, x, u, end)
-    }
-
-    fn curve(
-        &self,
-        path: Path,
-        start: (&[f64], &[f64], f64),
-        y: &mut [f64],
-        to: [&mut [f64]; 2],
-    ) -> Result<(), MetricError> {
-        self.on_manifold().curve(path, start, y, to)
-    }
-
-    fn lost_digits(&self, path: Path, x: &[f64], u: &[f64], end: &[f64], lost: &mut [f64]) {
-        self.on_manifold().lost_digits(path, x, u, end, lost);
-    }
-
-    fn accuracy(&self, path: Path) -> f64 {
-        self.on_manifold().accuracy(path)
-    }
-
-    fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
-        self.on_manifold().velocity_at(y, x, q, v, to);
-    }
-
-    fn transport(&self, x: &[f64], y: &[f64], vectors: &mut [f64]) {
-        self.on_manifold().transport(x, y, vectors);
-    }
-
-    fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
-        self.on_manifold().pairing_size(w, v)
+    fn with_paths<T>(&self, f: impl FnOnce(&PathsInNumbers<'_, Of<Y>, Y::Metric>) -> T) -> T {
+        f(&self.on_manifold())
     }
 }
+
+metriplectic_equations::follows_paths! { [Y: Metriplectic + ?Sized] InNumbers<'_, Y>: with_paths }
 
 /// The sizes of the coordinates at a point, all of them positive.
 pub(crate) fn units_at<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Vector<Of<Y>> {

@@ -431,10 +431,10 @@ impl<S: Apart> Differences<S> {
     }
 
     /// The columns of the derivative of `φ_y⁻¹ ∘ φ_x` at `q`, one after another.
-    fn turned(&self, y: &[f64], x: &[f64], q: &[f64]) -> Vec<f64> {
+    fn turn_all(&self, y: &[f64], x: &[f64], q: &[f64]) -> Vec<f64> {
         let (n, by_charts) = (self.n(), ByCharts(self));
         let mut columns = vec![0.0; n * n];
-        self.0.paths().unwrap_or(&by_charts).turned(y, x, q, &mut columns);
+        self.0.paths().unwrap_or(&by_charts).turn_all(y, x, q, &mut columns);
         columns
     }
 
@@ -446,7 +446,7 @@ impl<S: Apart> Differences<S> {
         let mut y = vec![0.0; x.len()];
         self.0.chart(x, q, &mut y);
         let ([values, w], n) = (jets(&self.0, t, &y), self.n());
-        let columns = self.turned(&y, x, q);
+        let columns = self.turn_all(&y, x, q);
         let along = |df: &[f64]| columns.chunks_exact(n).map(|e| dot(df, e)).collect::<Vec<_>>();
         [values, w.chunks_exact(n).flat_map(along).collect()]
     }
@@ -465,7 +465,7 @@ impl<S: Apart> Differences<S> {
         }
         let (n, mut y) = (self.n(), vec![0.0; x.len()]);
         self.0.chart(x, q, &mut y);
-        let columns = self.turned(x, &y, &vec![0.0; n]);
+        let columns = self.turn_all(x, &y, &vec![0.0; n]);
         let there = |w: &[f64]| columns.chunks_exact(n).map(|e| dot(w, e)).collect::<Vec<_>>();
         let [energy, entropy, alpha] = [w.energy, w.entropy, alpha].map(there);
         let w = Covectors { energy: &energy, entropy: &entropy };

@@ -104,7 +104,7 @@ pub trait Model: Equations {
     }
 
     /// Evaluates the first and the second derivative of all laws along the [curve](Paths::curve) of a path, at a fraction of its way. The
-    /// default asks for the curve, and for each law along its velocity and its acceleration.
+    /// default asks for the curve, for each law along its velocity, and for its differential along the acceleration.
     ///
     /// # Errors
     ///
@@ -117,14 +117,20 @@ pub trait Model: Equations {
         to: &mut [[f64; 2]],
     ) -> Result<(), MetricError> {
         let (x, n) = (start.0, start.1.len());
-        with_numbers(x.len() + 2 * n, |room| {
+        with_numbers(x.len() + 3 * n, |room| {
             let (y, room) = room.split_at_mut(x.len());
+            let (df, room) = room.split_at_mut(n);
             let (v, a) = room.split_at_mut(n);
             paths.0.curve(paths.1, start, y, [&mut *v, &mut *a])?;
             let turns = a.iter().any(|a| a.abs() > 0.0);
             for (law, to) in to.iter_mut().enumerate() {
                 let [_, first, _, second] = self.along(law, t, y, [v, v]);
-                let bent = if turns { self.along(law, t, y, [a, a])[1] } else { 0.0 };
+                let bent = if turns {
+                    self.jet(law, t, y, df);
+                    df.iter().zip(&*a).map(|(df, a)| df * a).sum()
+                } else {
+                    0.0
+                };
                 *to = [first, second + bent];
             }
             Ok(())

@@ -127,7 +127,7 @@ pub trait Paths {
     fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]);
 
     /// Computes the velocities of all directions in this way, the derivative of `φ_y⁻¹ ∘ φ_x` at `q`, one column after another.
-    fn turned(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
+    fn turn_all(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
         let n = q.len();
         with_numbers(n, |axis| {
             for (k, column) in columns.chunks_exact_mut(n.max(1)).enumerate() {
@@ -148,6 +148,91 @@ pub trait Paths {
         let square = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>();
         square(w).sqrt() * square(v).sqrt()
     }
+}
+
+/// Answers the questions of [`Paths`] by other paths, of which the method `$with` takes a closure.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! follows_paths {
+    ($(#[$doc:meta])* [$($generics:tt)*] $type:ty: $with:ident) => {
+        $(#[$doc])*
+        impl<$($generics)*> $crate::Paths for $type {
+            fn follows(&self, path: $crate::Path) -> bool {
+                self.$with(|paths| paths.follows(path))
+            }
+
+            fn path(
+                &self,
+                path: $crate::Path,
+                x: &[f64],
+                u: &[f64],
+                to: &mut $crate::PathAt<'_>,
+            ) -> Result<(), $crate::MetricError> {
+                self.$with(|paths| paths.path(path, x, u, to))
+            }
+
+            fn path_jet(
+                &self,
+                path: $crate::Path,
+                x: &[f64],
+                u: &[f64],
+                to: (&mut $crate::PathAt<'_>, &mut $crate::PathSlopes<'_>),
+            ) -> Result<(), $crate::MetricError> {
+                self.$with(|paths| paths.path_jet(path, x, u, to))
+            }
+
+            fn end(
+                &self,
+                path: $crate::Path,
+                x: &[f64],
+                u: &[f64],
+                end: &mut [f64],
+            ) -> Result<(), $crate::MetricError> {
+                self.$with(|paths| paths.end(path, x, u, end))
+            }
+
+            fn curve(
+                &self,
+                path: $crate::Path,
+                start: (&[f64], &[f64], f64),
+                y: &mut [f64],
+                to: [&mut [f64]; 2],
+            ) -> Result<(), $crate::MetricError> {
+                self.$with(|paths| paths.curve(path, start, y, to))
+            }
+
+            fn lost_digits(
+                &self,
+                path: $crate::Path,
+                x: &[f64],
+                u: &[f64],
+                end: &[f64],
+                lost: &mut [f64],
+            ) {
+                self.$with(|paths| paths.lost_digits(path, x, u, end, lost));
+            }
+
+            fn accuracy(&self, path: $crate::Path) -> f64 {
+                self.$with(|paths| paths.accuracy(path))
+            }
+
+            fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
+                self.$with(|paths| paths.velocity_at(y, x, q, v, to));
+            }
+
+            fn turn_all(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
+                self.$with(|paths| paths.turn_all(y, x, q, columns));
+            }
+
+            fn transport(&self, x: &[f64], y: &[f64], vectors: &mut [f64]) {
+                self.$with(|paths| paths.transport(x, y, vectors));
+            }
+
+            fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
+                self.$with(|paths| paths.pairing_size(w, v))
+            }
+        }
+    };
 }
 
 /// The lines of the charts of a model, `t ↦ φ_x(tu)`, with derivatives by differences.
@@ -374,87 +459,24 @@ impl Paths for ByCharts<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
-    use crate::{Apart, Covectors, Differences, Part, Sizes};
-
-    /// Angles, in charts `φ_x(q) = x + 2 atan(q/2)`.
-    struct Angle;
-
-    impl Angle {
-        fn turned(x: f64, q: f64) -> f64 {
-            x + 2.0 * (0.5 * q).atan()
-        }
-    }
-
-    impl Equations for Angle {
-        fn sizes(&self) -> Sizes {
-            Sizes { entries: 1, directions: 1, laws: 2 }
-        }
-
-        fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
-            values.copy_from_slice(&[x[0], 0.0]);
-        }
-
-        fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
-            self.values(t, x, values);
-            w.copy_from_slice(&[1.0, 0.0]);
-        }
-
-        fn velocity(&self, _: f64, _: &[f64], v: &mut [f64]) -> Option<f64> {
-            v.fill(0.0);
-            Some(0.0)
-        }
-
-        fn scales(&self, _: &[f64], sizes: &mut [f64]) {
-            sizes.fill(1.0);
-        }
-
-        fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
-            y[0] = Self::turned(x[0], q[0]);
-        }
-
-        fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
-            q[0] = 2.0 * (0.5 * (y[0] - x[0])).tan();
-            true
-        }
-    }
-
-    impl Apart for Angle {
-        fn is_zero(&self, _: Part) -> bool {
-            true
-        }
-
-        fn apply(&self, _: Part, _: f64, _: &[f64], _: Covectors<'_>, _: &[f64], v: &mut [f64]) {
-            v.fill(0.0);
-        }
-
-        fn has_charts(&self) -> bool {
-            true
-        }
-    }
-
-    #[test]
-    fn charts_have_the_paths_of_their_space() {
-        let model = Differences(Angle);
-        let (paths, x) = (ByCharts(&model), [0.4]);
-        let mut worst = 0.0_f64;
-        for k in 1..=40 {
-            let (u, mut z, mut d, mut end) = ([0.05 * f64::from(k)], [0.0], [0.0], [0.0]);
-            let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
-            paths.path(Path::Chart, &x, &u, to).unwrap();
-            // The velocity u of q at u/2, and θ' = q'/(1 + q²/4).
-            let exact = u[0] / (1.0 + u[0] * u[0] / 16.0);
-            worst = worst.max((d[0] - exact).abs() / exact);
-            crate::laws::paths(&model, &paths, Path::Chart, &x, &u).unwrap();
-        }
-        assert!(worst < 4e-13, "{worst:.1e}");
-        assert!(!paths.follows(Path::Weyl));
-    }
+    use crate::{Apart, Covectors, Differences, ENERGY, Part, Sizes};
 
     /// Angles with an entry beside, in charts `φ_x(q) = x + 2 atan(q/2)`, of which one sees another within half a turn.
+    #[derive(Default)]
     struct Turns {
         /// Else they are `φ_x(q) = x + q` on a circle.
         is_stretched: bool,
+        /// How often it was asked for differentials.
+        asked: Cell<usize>,
+    }
+
+    impl Turns {
+        fn stretched() -> Self {
+            Self { is_stretched: true, ..Self::default() }
+        }
     }
 
     impl Equations for Turns {
@@ -467,6 +489,7 @@ mod tests {
         }
 
         fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+            self.asked.set(self.asked.get() + 1);
             self.values(t, x, values);
             w.copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
         }
@@ -481,7 +504,7 @@ mod tests {
         }
 
         fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
-            y[0] = if self.is_stretched { Angle::turned(x[0], q[0]) } else { x[0] + q[0] };
+            y[0] = x[0] + if self.is_stretched { 2.0 * (0.5 * q[0]).atan() } else { q[0] };
             y[1] = x[1] + q[1];
         }
 
@@ -510,8 +533,49 @@ mod tests {
     }
 
     #[test]
+    fn charts_have_the_paths_of_their_space() {
+        let model = Differences(Turns::stretched());
+        let (paths, x) = (ByCharts(&model), [0.4, 1.0]);
+        let mut worst = 0.0_f64;
+        for k in 1..=40 {
+            let ([mut z, mut d, mut end], u) = ([[0.0; 2]; 3], [0.05 * f64::from(k), 0.0]);
+            let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+            paths.path(Path::Chart, &x, &u, to).unwrap();
+            // The velocity u of q at u/2, and θ' = q'/(1 + q²/4).
+            let exact = u[0] / (1.0 + u[0] * u[0] / 16.0);
+            worst = worst.max((d[0] - exact).abs() / exact);
+            crate::laws::paths(&model, &paths, Path::Chart, &x, &u).unwrap();
+        }
+        assert!(worst < 4e-13, "{worst:.1e}");
+        assert!(!paths.follows(Path::Weyl));
+    }
+
+    #[test]
+    fn the_acceleration_of_a_curve_costs_one_differential() {
+        let model = Differences(Turns::stretched());
+        let (paths, x, u) = (ByCharts(&model), [0.4, 1.0], [0.7, 0.1]);
+        let asked = |f: &mut dyn FnMut()| {
+            let before = model.0.asked.get();
+            f();
+            model.0.asked.get() - before
+        };
+        let [mut y, mut v, mut a] = [[0.0; 2]; 3];
+        let start = (&x[..], &u[..], 0.5);
+        paths.curve(Path::Chart, start, &mut y, [&mut v, &mut a]).unwrap();
+        assert!(a[0].abs() > 1e-3, "{a:?}");
+        let velocity = asked(&mut || drop(model.along(ENERGY, 0.0, &y, [&v, &v])));
+        let mut law = [[0.0; 2]];
+        let both = asked(&mut || {
+            model.along_curve(0.0, (&paths, Path::Chart), start, &mut law).unwrap();
+        });
+        assert!(both <= velocity + 1 && velocity > 2, "{both} and {velocity}");
+        // The energy is the angle.
+        assert!((law[0][0] - v[0]).abs() + (law[0][1] - a[0]).abs() < 1e-9, "{law:?}");
+    }
+
+    #[test]
     fn a_displacement_keeps_its_digits_where_an_entry_passes_zero() {
-        let model = Differences(Turns { is_stretched: true });
+        let model = Differences(Turns::stretched());
         let paths = ByCharts(&model);
         for small in [0.2, 1e-4, 1e-9, -1e-12, 1e-16, 1e-300, 0.0] {
             let (x, u) = ([0.4, small], [0.7, 0.01]);
@@ -526,7 +590,7 @@ mod tests {
 
     #[test]
     fn a_way_around_the_space_is_beyond_the_chart() {
-        let model = Differences(Turns { is_stretched: false });
+        let model = Differences(Turns::default());
         let follow = |u: f64| {
             let [mut z, mut d, mut end] = [[0.0; 2]; 3];
             let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };

@@ -4,7 +4,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::judge::{Judge, RADIUS};
-use crate::{Equations, Kind, Model, ModelError, PointError, SecondLaw, Sizes};
+use crate::{Equations, ModelError};
 
 /// A system whose laws were verified once. A run of it checks them at its start alone, without samples around it.
 #[derive(Clone, Copy, Debug)]
@@ -28,10 +28,13 @@ impl<S: Equations> VerifiedEquations<S> {
     }
 }
 
-macro_rules! answers {
-    ($($(#[$sized:ident])? $type:ty: $this:ident => $other:expr, $verified:expr;)+) => {$(
-        impl<S: Equations $(+ ?$sized)?> Equations for $type {
-            fn sizes(&self) -> Sizes {
+/// Answers the questions of [`Equations`] by those of another system.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! answered_by {
+    ($([$($generics:tt)*] $type:ty: $this:ident => $other:expr, $verified:expr;)+) => {$(
+        impl<$($generics)*> $crate::Equations for $type {
+            fn sizes(&self) -> $crate::Sizes {
                 let $this = self;
                 $other.sizes()
             }
@@ -51,12 +54,12 @@ macro_rules! answers {
                 $other.velocity(t, x, v)
             }
 
-            fn second_law(&self) -> SecondLaw {
+            fn second_law(&self) -> $crate::SecondLaw {
                 let $this = self;
                 $other.second_law()
             }
 
-            fn kind(&self, invariant: usize) -> Kind {
+            fn kind(&self, invariant: usize) -> $crate::Kind {
                 let $this = self;
                 $other.kind(invariant)
             }
@@ -71,7 +74,7 @@ macro_rules! answers {
                 $other.power(t, x)
             }
 
-            fn check(&self, x: &[f64]) -> Result<(), PointError> {
+            fn check(&self, x: &[f64]) -> Result<(), $crate::PointError> {
                 let $this = self;
                 $other.check(x)
             }
@@ -131,7 +134,7 @@ macro_rules! answers {
                 $verified($other)
             }
 
-            fn model(&self) -> Option<&dyn Model> {
+            fn model(&self) -> Option<&dyn $crate::Model> {
                 let $this = self;
                 $other.model()
             }
@@ -139,10 +142,10 @@ macro_rules! answers {
     )+};
 }
 
-answers! {
-    #[Sized] &S: this => &**this, |of: &S| of.is_verified();
-    #[Sized] Box<S>: this => &**this, |of: &S| of.is_verified();
-    #[Sized] Rc<S>: this => &**this, |of: &S| of.is_verified();
-    #[Sized] Arc<S>: this => &**this, |of: &S| of.is_verified();
-    VerifiedEquations<S>: this => &this.0, |_: &S| true;
+answered_by! {
+    [S: Equations + ?Sized] &S: this => &**this, |of: &S| of.is_verified();
+    [S: Equations + ?Sized] Box<S>: this => &**this, |of: &S| of.is_verified();
+    [S: Equations + ?Sized] Rc<S>: this => &**this, |of: &S| of.is_verified();
+    [S: Equations + ?Sized] Arc<S>: this => &**this, |of: &S| of.is_verified();
+    [S: Equations] VerifiedEquations<S>: this => &this.0, |_: &S| true;
 }

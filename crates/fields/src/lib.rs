@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`scalar`] | [`Scalar`]: `f64` or a dual number over it; [`Real`], the one a closure uses |
 //! | [`column`](mod@column), [`square`] | [`Column`], [`Square`]: vectors and matrices of a size that the compiler knows |
+//! | [`triangular`] | Cholesky factors of matrices, of a size that is known at run time too |
 //! | [`dimension`] | [`Dimension`]: the size, and the types that have it |
 //! | [`space`] | [`Space`]: points at each scalar, and the chart around a point |
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
@@ -40,6 +41,7 @@ pub mod series;
 pub mod space;
 pub mod square;
 pub mod stack;
+pub mod triangular;
 
 pub use column::{Column, dot, length, power_of_two};
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};

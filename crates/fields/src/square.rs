@@ -10,6 +10,7 @@ use num_dual::linalg::LU;
 
 use crate::column::{Column, SQUARES, scaled_norm};
 use crate::scalar::Scalar;
+use crate::triangular;
 
 /// A square matrix of scalars.
 pub trait Square<D: Scalar>:
@@ -141,23 +142,7 @@ pub trait Square<D: Scalar>:
     #[inline]
     fn cholesky(&self) -> Result<Self, NotPositive> {
         let mut l = Self::zeros();
-        for j in 0..Self::Column::LEN {
-            let mut pivot = self[(j, j)];
-            for k in 0..j {
-                pivot -= l[(j, k)] * l[(j, k)];
-            }
-            if !(pivot.re() > 0.0 && pivot.re().is_finite()) {
-                return Err(NotPositive { index: j, pivot: pivot.re() });
-            }
-            l[(j, j)] = pivot.sqrt();
-            for i in j + 1..Self::Column::LEN {
-                let mut entry = self[(i, j)];
-                for k in 0..j {
-                    entry -= l[(i, k)] * l[(j, k)];
-                }
-                l[(i, j)] = entry / l[(j, j)];
-            }
-        }
+        triangular::factor(Self::Column::LEN, self, &mut l)?;
         Ok(l)
     }
 
@@ -165,13 +150,7 @@ pub trait Square<D: Scalar>:
     #[inline]
     fn solve_lower(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
-        for i in 0..Self::Column::LEN {
-            for k in 0..i {
-                let known = self[(i, k)] * x[k];
-                x[i] -= known;
-            }
-            x[i] /= self[(i, i)];
-        }
+        triangular::solve(Self::Column::LEN, self, &mut x);
         x
     }
 
@@ -179,13 +158,7 @@ pub trait Square<D: Scalar>:
     #[inline]
     fn solve_lower_transpose(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
-        for i in (0..Self::Column::LEN).rev() {
-            for k in i + 1..Self::Column::LEN {
-                let known = self[(k, i)] * x[k];
-                x[i] -= known;
-            }
-            x[i] /= self[(i, i)];
-        }
+        triangular::solve_transpose(Self::Column::LEN, self, &mut x);
         x
     }
 

@@ -7,7 +7,7 @@ use argmin::core::{Executor, State as _, TerminationReason};
 use metriplectic_dynamics::{Differentiable, Parametrised, Point};
 use metriplectic_fields::{Dimension as _, Real, Space};
 use metriplectic_integrators::step::Element;
-use metriplectic_integrators::tangent::LinearisedAlong;
+use metriplectic_integrators::tangent::{Fittable, LinearisedAlong};
 use metriplectic_integrators::{Flow, Schedule, Stepper, Systems};
 use nalgebra::{SMatrix, SVector};
 
@@ -30,6 +30,7 @@ const ROUNDED: f64 = 4096.0 * f64::EPSILON;
 /// | of | the system | derivatives of the runs |
 /// |---|---|---|
 /// | [`Fit::of`] a [`Family`](metriplectic_dynamics::Family) | closed | exact, those of the discrete steps |
+/// | [`Fit::of`] a family with [surroundings](metriplectic_integrators::FamilySurroundings) | with ports, baths, a clock or noise | differences of runs in the same steps |
 /// | [`Fit::of_systems`] | of any kind: with ports, baths and noise, a lattice, one of your own | differences of runs in the same steps |
 ///
 /// ```
@@ -81,12 +82,15 @@ impl<Y, const P: usize> fmt::Debug for Fit<Y, P> {
     }
 }
 
-impl<'a, Y: Parametrised<P>, const P: usize> Fit<&'a Y, P> {
-    /// Starts a fit of the parameters of a family.
-    pub const fn of(family: &'a Y) -> Self {
-        Self { of: family }
+impl<const P: usize> Fit<(), P> {
+    /// Starts a fit of the parameters of a [`Family`](metriplectic_dynamics::Family), or of one with ports, baths, a clock or noise, whose
+    /// derivatives are those of [`of_systems`](Fit::of_systems).
+    pub fn of<Y: Fittable<P>>(family: &Y) -> Fit<Y::Systems<'_>, P> {
+        Fit { of: family.systems() }
     }
+}
 
+impl<'a, Y: Parametrised<P>, const P: usize> Fit<&'a Y, P> {
     /// Says what was measured, as a closure of the state that returns `K` numbers. It is differentiated as a field is.
     pub fn observe<F, const K: usize>(
         self,

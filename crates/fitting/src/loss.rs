@@ -9,7 +9,7 @@ use argmin::solver::quasinewton::LBFGS;
 use metriplectic_dynamics::{Parametrised, Point};
 use metriplectic_fields::{Real, Space};
 use metriplectic_integrators::step::Element;
-use metriplectic_integrators::tangent::LinearisedAlong;
+use metriplectic_integrators::tangent::{Fittable, LinearisedAlong};
 use metriplectic_integrators::{
     Adjoints as _, Flow, Method as _, Schedule, Stepper, Systems, Watch as _,
 };
@@ -84,10 +84,11 @@ impl<Y, X, T, const P: usize> fmt::Debug for Loss<Y, X, T, P> {
     }
 }
 
-impl<'a, Y: Parametrised<P>, const P: usize> Loss<&'a Y, Point<Y::System>, (), P> {
-    /// Starts a loss over runs of a family.
-    pub const fn of(family: &'a Y) -> Self {
-        Self { of: family, starts: Vec::new(), times: Vec::new(), term: () }
+impl<const P: usize> Loss<(), (), (), P> {
+    /// Starts a loss over runs of a [`Family`](metriplectic_dynamics::Family), or of one with ports, baths, a clock or noise, whose gradient
+    /// is that of [`of_systems`](Loss::of_systems).
+    pub fn of<Y: Fittable<P>>(family: &Y) -> Loss<Y::Systems<'_>, Y::Start, (), P> {
+        Loss { of: family.systems(), starts: Vec::new(), times: Vec::new(), term: () }
     }
 }
 

@@ -45,7 +45,7 @@ use crate::numbers::{AtRunTime, FromEquations, Known, Lengths, OfLength};
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::passed_on::passed_on;
 use crate::step::{
-    Compiled, Control, Effort, Element, Flow, Laws, LineOfStep, MethodError, Promises, Refusal,
+    Compiled, Control, Effort, Element, Flow, Laws, MethodError, PathOfStep, Promises, Refusal,
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, dense,
 };
 
@@ -277,7 +277,7 @@ where
     W: DiscreteGradient,
 {
     let line = R::PATH.zip(W::KIND);
-    let line = line.map(|(path, gradient)| LineOfStep { path, gradient });
+    let line = line.map(|(path, gradient)| PathOfStep { path, gradient });
     Midpoint { name: scheme_name::<R, W>, line, newton, splits }
 }
 

@@ -92,7 +92,7 @@ pub use run::{
 pub use step::{
     Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
     EventExchange, Evidence, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,
-    LedgerSummary, LimitingSites, LineOfStep, Listed, Memory, MethodError, NoiseSummary, Panicked,
+    LedgerSummary, LimitingSites, Listed, Memory, MethodError, NoiseSummary, Panicked, PathOfStep,
     PlainNumbers, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError,
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,
 };

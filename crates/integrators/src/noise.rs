@@ -63,6 +63,7 @@ mod verify;
 
 pub use builder::{Fluctuates, NoiseBuilder};
 pub(crate) use closed::{ROUND_OFF, examine_model, vanishes};
+pub(crate) use equations::{OwnTerms, Term, kinetic_drift, start_and_near, summed};
 pub use error::{NoiseError, NoisyError};
 pub use fluctuating::{Drawn, Fluctuating, Landing, Noise};
 pub use judged::Judged;

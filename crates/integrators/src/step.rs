@@ -40,7 +40,7 @@ mod vector;
 
 pub(crate) use both::both;
 #[doc(hidden)]
-pub use compiled::{Compiled, GradientKind, LineOfStep};
+pub use compiled::{Compiled, GradientKind, PathOfStep};
 pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};

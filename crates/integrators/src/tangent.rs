@@ -64,6 +64,8 @@ mod tape;
 /// The most corrections of a root, which converge quadratically.
 const CORRECTIONS: usize = 10;
 
+#[doc(hidden)]
+pub use crate::smooth_open_flow;
 pub use crate::step::HasFlow;
 pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
 pub use along::LinearisedAlong;
@@ -72,7 +74,10 @@ pub use columns::{Carried, Columns, LawRows, Moved};
 pub use differentiated::Differentiated;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
-pub use families::{BathOf, Depends, FamilySurroundings, InTimeOf, OpenFamily, SurroundingsOf};
+pub use families::{
+    BathOf, BuildMember, Depends, FamilySurroundings, Fittable, InTimeOf, OpenFamily,
+    SurroundingsOf,
+};
 #[doc(hidden)]
 pub use frames::between;
 pub use linearised::{Linearised, Piece, Propagated, Targets};

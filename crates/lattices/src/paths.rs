@@ -116,12 +116,12 @@ impl<P: Model> Paths for Dense<'_, P> {
         });
     }
 
-    fn turned(&self, y: &[f64], x: &[f64], at: &[f64], columns: &mut [f64]) {
+    fn turn_all(&self, y: &[f64], x: &[f64], at: &[f64], columns: &mut [f64]) {
         let (n, all) = (dimension::<P>(), at.len());
         let mut block = vec![0.0; n * n];
         columns.fill(0.0);
         self.each_site(x.len(), |[e, q]| {
-            self.on_site().turned(&y[e.clone()], &x[e], &at[q.clone()], &mut block);
+            self.on_site().turn_all(&y[e.clone()], &x[e], &at[q.clone()], &mut block);
             for (k, column) in block.chunks_exact(n).enumerate() {
                 let first = (q.start + k) * all + q.start;
                 columns[first..first + n].copy_from_slice(column);

@@ -1,9 +1,10 @@
 //! The derivatives of runs of lattices, by differences of steps.
 
 use metriplectic_fields::{Column as _, Real, Space, Vector as Components};
-use metriplectic_integrators::open::OpenFlow as _;
-use metriplectic_integrators::tangent::{Differentiated, LawRows, SmoothFlow, between};
-use metriplectic_integrators::{Element, Flow as _, Laws, Listed as _, Stepper, Vector as _};
+use metriplectic_integrators::tangent::{
+    Differentiated, LawRows, SmoothFlow, between, smooth_open_flow,
+};
+use metriplectic_integrators::{Element, Stepper};
 use nalgebra::{DMatrix, DVector};
 
 use crate::lattice::{Lattice, differentials_at, dimension};
@@ -97,76 +98,17 @@ fn moved<P: Model>(x: &Points<P::Manifold>, q: impl Fn(usize) -> Real) -> Moving
     x.iter().enumerate().map(site).collect()
 }
 
-impl<P: Model> SmoothFlow for OpenLattice<P> {
-    type Moving = Moving<P>;
+/// By differences of steps.
+impl<P: Model, M: Stepper<Self>> Differentiated<M> for Lattice<P> {
+    type MovingWide = Moving<P>;
 
-    fn directions(&self) -> usize {
-        // The clock, the work of the time, and what ports and baths book.
-        self.lattice().directions() + 1 + self.layout().entry_sizes().len()
+    fn moved_along(&self, x: &Element<Self>, v: &DVector<f64>) -> Moving<P> {
+        self.moving(x, v)
     }
 
-    fn clock(&self) -> Option<usize> {
-        Some(self.lattice().directions())
-    }
-
-    fn power_of_time(&self, x: &Element<Self>) -> Option<(usize, f64)> {
-        let place = self.lattice().directions() + 1;
-        self.has_clock().then(|| (place, self.power(x.time, &x.x)))
-    }
-
-    /// The differentials of the balance `H − W − Q` and of `S + Σ S_b`. The clock moves neither: the frozen work is booked.
-    fn law_rows(&self, x: &Element<Self>) -> LawRows<DVector<f64>> {
-        let (n, all) = (self.lattice().directions(), self.directions());
-        let rows = self.at(x.time).law_rows(&x.x);
-        let mut rows = rows.map(|row| row.clone().resize_vertically(all, 0.0));
-        let (start, zero) = (self.start(x.x.clone()), self.sizes(x).zero());
-        for i in n + 1..all {
-            let entry = zero.with(|k| if k == i { 1.0 } else { 0.0 });
-            let none = Laws { energy: 0.0, entropy: 0.0, invariants: [(); 0] };
-            let booked = self.moved(&start, &entry).ledger.balanced(none);
-            rows.set(i, booked.energy, booked.entropy);
-        }
-        rows
-    }
-
-    fn turn(&self, from: &Element<Self>, to: &Element<Self>) -> Option<DMatrix<f64>> {
-        let turn = self.lattice().turn(&from.x, &to.x)?;
-        let mut whole = DMatrix::identity(self.directions(), self.directions());
-        whole.view_mut((0, 0), turn.shape()).copy_from(&turn);
-        Some(whole)
-    }
-
-    fn differential(
-        &self,
-        f: &dyn Fn(&Moving<P>) -> Real,
-        x: &Element<Self>,
-    ) -> (f64, DVector<f64>) {
-        let (value, df) = self.lattice().differential(f, &x.x);
-        (value, df.resize_vertically(self.directions(), 0.0))
-    }
-
-    fn moving(&self, x: &Element<Self>, v: &DVector<f64>) -> Moving<P> {
-        self.lattice().moving(&x.x, v)
-    }
-
-    fn coordinates(&self, y: &Element<Self>, there: &Moving<P>) -> Vec<[f64; 2]> {
-        self.lattice().coordinates(&y.x, there)
+    fn coordinates_around(&self, y: &Element<Self>, there: &Moving<P>) -> Vec<[f64; 2]> {
+        SmoothFlow::coordinates(self, y, there)
     }
 }
 
-macro_rules! by_differences {
-    ($($flow:ident),+) => {$(
-        impl<P: Model, M: Stepper<Self>> Differentiated<M> for $flow<P> {
-            type MovingWide = Moving<P>;
-
-            fn moved_along(&self, x: &Element<Self>, v: &DVector<f64>) -> Moving<P> {
-                self.moving(x, v)
-            }
-
-            fn coordinates_around(&self, y: &Element<Self>, there: &Moving<P>) -> Vec<[f64; 2]> {
-                SmoothFlow::coordinates(self, y, there)
-            }
-        }
-    )+};
-}
-by_differences!(Lattice, OpenLattice);
+smooth_open_flow! { [P: Model] OpenLattice<P>, moving: Moving<P> }

@@ -94,6 +94,14 @@ fn put_curve<M: Manifold>(at: &M::Point<Real>, y: &mut [f64], [v, a]: [&mut [f64
     put(&Vector::<M>::from_index(|i| q[i].eps1eps2), a);
 }
 
+/// Refuses a line whose end is not finite.
+fn ends<M: Manifold>(end: &M::Point<f64>) -> Result<(), MetricError> {
+    let mut value = 0.0;
+    M::write(end, &mut |entry| value += 0.0 * entry);
+    let quantity = "a coordinate of the end";
+    if value == 0.0 { Ok(()) } else { Err(MetricError::NotFinite { quantity, value }) }
+}
+
 /// The straight lines of the charts of a manifold without a metric, of which a path may have its base at the start.
 #[derive(Debug)]
 pub struct LinesInNumbers<M>(PhantomData<M>);
@@ -119,6 +127,7 @@ impl<M: Manifold> Paths for LinesInNumbers<M> {
         let (x, u) = (point::<M>(x), column(u));
         reached::<M>(&u)?;
         let StepPath { z, d, end } = M::line(&x, &u);
+        ends::<M>(&end)?;
         match path {
             Path::Exponential => put_path::<M>(&x, &u, &end, to),
             Path::Weyl | Path::Chart => put_path::<M>(&z.base, &d, &end, to),
@@ -136,6 +145,7 @@ impl<M: Manifold> Paths for LinesInNumbers<M> {
         let (x, u) = (point::<M>(x), column(u));
         reached::<M>(&u)?;
         let mut jet = M::line_jet(&x, &u);
+        ends::<M>(&jet.end)?;
         if path == Path::Exponential {
             (jet.z, jet.d) = (x, u);
             (jet.dz, jet.dd) = (Matrix::<M>::zeros(), Matrix::<M>::one());
@@ -151,7 +161,11 @@ impl<M: Manifold> Paths for LinesInNumbers<M> {
         y: &mut [f64],
         to: [&mut [f64]; 2],
     ) -> Result<(), MetricError> {
-        put_curve::<M>(&M::line_at(&point::<M>(x), &column(u), t), y, to);
+        let u = column(u);
+        reached::<M>(&u)?;
+        let at = M::line_at(&point::<M>(x), &u, t);
+        ends::<M>(&M::real(&at))?;
+        put_curve::<M>(&at, y, to);
         Ok(())
     }
 
@@ -304,5 +318,33 @@ impl<M: Manifold, G: Riemannian<M>> Paths for PathsInNumbers<'_, M, G> {
 
     fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
         LinesInNumbers::<M>::default().pairing_size(w, v)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Euclidean, HalfLine};
+
+    /// The chart of a half line is an exponential, which overflows; on a vector space a sum does.
+    #[test]
+    fn a_line_whose_end_is_not_finite_is_refused() {
+        fn refuses<M: Manifold>(name: &str, x: f64, u: f64, is_refused: bool) {
+            let lines = LinesInNumbers::<M>::default();
+            let [mut z, mut d, mut end, mut dz, mut dd, mut dend] = [[0.0]; 6];
+            let to = &mut PathAt { z: &mut z, d: &mut d, end: &mut end };
+            let alone = lines.path(Path::Chart, &[x], &[u], to).is_err();
+            let slopes = &mut PathSlopes { dz: &mut dz, dd: &mut dd, dend: &mut dend };
+            let jet = lines.path_jet(Path::Chart, &[x], &[u], (to, slopes)).is_err();
+            let ended = lines.end(Path::Chart, &[x], &[u], &mut [0.0]).is_err();
+            let start = (&[x][..], &[u][..], 1.0);
+            let curve = lines.curve(Path::Chart, start, &mut [0.0], [&mut [0.0], &mut [0.0]]);
+            assert_eq!([alone, jet, ended, curve.is_err()], [is_refused; 4], "{name}: {u}");
+        }
+        refuses::<HalfLine>("a half line", 1.0, 300.0, false);
+        refuses::<HalfLine>("a half line", 1.0, 1e3, true);
+        refuses::<Euclidean<1>>("a line", 1e308, 1e307, false);
+        refuses::<Euclidean<1>>("a line", 1e308, 1e308, true);
+        refuses::<Euclidean<1>>("a line", 1.0, f64::NAN, true);
     }
 }

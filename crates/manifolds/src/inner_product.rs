@@ -1,6 +1,6 @@
 //! The metric at one point.
 
-use metriplectic_fields::{Column, Dimension, Scalar, Square};
+use metriplectic_fields::{Column, Dimension, Scalar, Square, triangular};
 
 use crate::metric_error::{MetricError, finite};
 
@@ -104,27 +104,15 @@ impl<N: Dimension, D: Scalar> InnerProduct<N::Vector<D>> for Factored<N, D> {
     }
 }
 
-/// Refuses a matrix that is not symmetric up to the rounding of its entries: relative to `√(g_ii g_jj)`,
-/// the size that an entry can have in a positive matrix, in its own unit.
+/// Refuses a matrix that is not finite, or not symmetric up to the rounding of its entries.
 fn symmetric<D: Scalar, A: Square<D>>(g: &A) -> Result<(), MetricError> {
     if !g.max_abs().is_finite() {
         return Err(entry_not_finite(g));
     }
-    for i in 0..A::Column::LEN {
-        for j in 0..i {
-            let size = (g[(i, j)].re() - g[(j, i)].re()).abs();
-            if size > 0.0 && size > 64.0 * f64::EPSILON * entry_size(g, i, j) {
-                return Err(MetricError::NotSymmetric { row: i, column: j, size });
-            }
-        }
+    match triangular::asymmetric(A::Column::LEN, g) {
+        Some((row, column, size)) => Err(MetricError::NotSymmetric { row, column, size }),
+        None => Ok(()),
     }
-    Ok(())
-}
-
-/// The size `√(g_ii g_jj)` of an entry of a positive matrix.
-#[cold]
-fn entry_size<D: Scalar, A: Square<D>>(g: &A, i: usize, j: usize) -> f64 {
-    g[(i, i)].re().abs().sqrt() * g[(j, j)].re().abs().sqrt()
 }
 
 /// The first entry that is not finite.

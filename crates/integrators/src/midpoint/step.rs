@@ -16,7 +16,7 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Compiled, Dim, Effort, Evidence, Flow as _, GradientKind, Laws, LineOfStep, Promises, Refusal,
+    Compiled, Dim, Effort, Evidence, Flow as _, GradientKind, Laws, PathOfStep, Promises, Refusal,
     Start, StepError, StepStart, Stepper, Taken, name_of,
 };
 
@@ -35,7 +35,7 @@ where
     fn compiled(&self) -> Option<Compiled> {
         let &Self { newton, splits, .. } = self;
         let gradient = W::KIND.filter(|_| has_bits_of_types(W::KIND))?;
-        let line = LineOfStep { path: R::PATH?, gradient };
+        let line = PathOfStep { path: R::PATH?, gradient };
         Some(Compiled::Midpoint { name: scheme_name::<R, W>, line, newton, splits })
     }
 

@@ -47,9 +47,9 @@ fn half_widths(x: &[f64]) -> Vec<f64> {
 }
 
 /// A term of a friction.
-struct Term {
-    rate: f64,
-    b: Vec<(usize, f64)>,
+pub(crate) struct Term {
+    pub(crate) rate: f64,
+    pub(crate) b: Vec<(usize, f64)>,
 }
 
 impl Term {
@@ -59,49 +59,86 @@ impl Term {
     }
 
     /// `⟨w, b⟩`, and the size of its terms.
-    fn along(&self, w: &[f64]) -> [f64; 2] {
+    pub(crate) fn along(&self, w: &[f64]) -> [f64; 2] {
         let products = self.b.iter().map(|&(k, b)| w[k] * b);
         products.fold([0.0; 2], |[sum, size], product| [sum + product, size + product.abs()])
     }
 
     /// Adds `c b`.
-    fn add_to(&self, v: &mut [f64], c: f64) {
+    pub(crate) fn add_to(&self, v: &mut [f64], c: f64) {
         self.b.iter().for_each(|&(k, b)| v[k] += c * b);
     }
 }
 
-impl<S: FrictionTerms> FromEquations<S> {
+/// Computes the kinetic drift `Σ_r c_r b_r` of terms, with `c_r = ρ_r div b_r + ½ ⟨dρ_r, b_r⟩`, in `n` directions.
+pub(crate) fn kinetic_drift(
+    n: usize,
+    x: &[f64],
+    terms_at: impl Fn(&[f64]) -> Vec<Term>,
+) -> Option<Directions> {
+    let here = terms_at(x);
+    let mut factors = vec![0.0; here.len()];
+    for (k, width) in half_widths(x).into_iter().enumerate() {
+        let [up, down] = [width, -width].map(|by| {
+            let mut y = x.to_vec();
+            y[k] += by;
+            terms_at(&y)
+        });
+        let quotient = |up: f64, down: f64| (up - down) / (2.0 * width);
+        for (r, factor) in factors.iter_mut().enumerate() {
+            // A friction that lists fewer terms there has no value.
+            let (up, down) = (up.get(r)?, down.get(r)?);
+            *factor += here[r].rate * quotient(up.entry(k), down.entry(k))
+                + 0.5 * quotient(up.rate, down.rate) * here[r].entry(k);
+        }
+    }
+    summed(n, |v| here.iter().zip(factors).for_each(|(term, c)| term.add_to(v, c)))
+}
+
+/// A vector of `n` directions as a sum, if it is finite.
+pub(crate) fn summed(n: usize, add: impl FnOnce(&mut [f64])) -> Option<Directions> {
+    let mut v = vec![0.0; n];
+    add(&mut v);
+    v.iter().all(|v| v.is_finite()).then(|| Directions::of(&v))
+}
+
+/// A system whose friction is known as a sum of terms, at a time.
+#[derive(Clone, Copy)]
+pub(crate) struct OwnTerms<'a> {
+    pub(crate) system: &'a dyn FrictionTerms,
+    pub(crate) t: f64,
+}
+
+impl OwnTerms<'_> {
+    /// The number of directions.
+    pub(crate) fn directions(&self) -> usize {
+        self.system.sizes().directions
+    }
+
     /// The covectors of energy and entropy at a state.
-    fn both_covectors(&self, x: &[f64]) -> [Vec<f64>; 2] {
-        let Sizes { laws, directions: n, .. } = self.0.sizes();
+    pub(crate) fn both_covectors(&self, x: &[f64]) -> [Vec<f64>; 2] {
+        let Sizes { laws, directions: n, .. } = self.system.sizes();
         let [mut values, mut w] = [laws, laws * n].map(|count| vec![0.0; count]);
-        self.0.differentials(NO_CLOCK, x, &mut values, &mut w);
+        self.system.differentials(self.t, x, &mut values, &mut w);
         [ENERGY, ENTROPY].map(|law| w[law * n..][..n].to_vec())
     }
 
     /// The terms at a state with these covectors.
-    fn terms_with(&self, x: &[f64], [energy, entropy]: &[Vec<f64>; 2]) -> Vec<Term> {
-        let mut terms = Vec::with_capacity(self.0.term_count());
+    pub(crate) fn terms_with(&self, x: &[f64], [energy, entropy]: &[Vec<f64>; 2]) -> Vec<Term> {
+        let mut terms = Vec::with_capacity(self.system.term_count());
         let w = Covectors { energy, entropy };
-        self.0.terms(NO_CLOCK, x, w, &mut |rate, b| terms.push(Term { rate, b: b.to_vec() }));
+        self.system.terms(self.t, x, w, &mut |rate, b| terms.push(Term { rate, b: b.to_vec() }));
         terms
     }
 
-    fn terms_at(&self, x: &[f64]) -> Vec<Term> {
+    pub(crate) fn terms_at(&self, x: &[f64]) -> Vec<Term> {
         self.terms_with(x, &self.both_covectors(x))
-    }
-
-    /// A vector as a sum, if it is finite.
-    fn summed(&self, add: impl FnOnce(&mut [f64])) -> Option<Directions> {
-        let mut v = vec![0.0; self.0.sizes().directions];
-        add(&mut v);
-        v.iter().all(|v| v.is_finite()).then(|| Directions::of(&v))
     }
 
     /// The component `k` of the reversible motion `x' − K dS`, and the size of its terms.
     fn reversible(&self, x: &[f64], k: usize) -> Option<[f64; 2]> {
         let (w, mut v) = (self.both_covectors(x), vec![0.0; x.len()]);
-        self.0.velocity(NO_CLOCK, x, &mut v)?;
+        self.system.velocity(self.t, x, &mut v)?;
         let terms = self.terms_with(x, &w);
         let by_term = terms.iter().map(|term| term.entry(k) * term.rate * term.along(&w[1])[0]);
         Some(by_term.fold([v[k], v[k].abs()], |[sum, size], by| [sum - by, size + by.abs()]))
@@ -113,8 +150,8 @@ impl<S: FrictionTerms> FromEquations<S> {
     ///
     /// [`NoiseError::BadTerms`], [`NoiseError::TermsOff`].
     fn examine_terms(&self, x: &[f64]) -> Result<(), NoiseError> {
-        let (w, directions) = (self.both_covectors(x), self.0.sizes().directions);
-        let (terms, expected) = (self.terms_with(x, &w), self.0.term_count());
+        let (w, directions) = (self.both_covectors(x), self.system.sizes().directions);
+        let (terms, expected) = (self.terms_with(x, &w), self.system.term_count());
         let outside = |term: &Term| term.b.iter().any(|(k, _)| *k >= directions);
         if terms.len() != expected || terms.iter().any(outside) {
             return Err(NoiseError::BadTerms { found: terms.len(), expected, directions });
@@ -132,9 +169,9 @@ impl<S: FrictionTerms> FromEquations<S> {
             produced += term.rate * term.along(&w[1])[0].powi(2);
         }
         let mut v = vec![0.0; directions];
-        let Some(production) = self.0.velocity(NO_CLOCK, x, &mut v) else { return Ok(()) };
+        let Some(production) = self.system.velocity(self.t, x, &mut v) else { return Ok(()) };
         holds("Σ ρ ⟨dS, b⟩² = ⟨dS, K dS⟩", produced - production, produced + production.abs())?;
-        let Some(model) = self.0.model() else { return Ok(()) };
+        let Some(model) = self.system.model() else { return Ok(()) };
         // Along a covector that no term knows of.
         let alpha: Vec<f64> = w[1]
             .iter()
@@ -144,7 +181,7 @@ impl<S: FrictionTerms> FromEquations<S> {
             .collect();
         let (place, covectors) =
             ((x, &vec![0.0; x.len()][..]), Covectors { energy: &w[0], entropy: &w[1] });
-        let applied = model.apply(Part::Irreversible, NO_CLOCK, place, covectors, &alpha, &mut v);
+        let applied = model.apply(Part::Irreversible, self.t, place, covectors, &alpha, &mut v);
         if model.is_zero(Part::Irreversible) || applied.is_err() {
             return Ok(());
         }
@@ -185,6 +222,63 @@ impl<S: FrictionTerms> FromEquations<S> {
         }
         Ok(())
     }
+
+    /// Verifies at a state and near it the terms and the volume.
+    ///
+    /// # Errors
+    ///
+    /// [`NoiseError::NotAVectorSpace`], [`NoiseError::BadTerms`], [`NoiseError::TermsOff`], [`NoiseError::NotUnimodular`].
+    pub(crate) fn examine(&self, x: &[f64]) -> Result<(), NoiseError> {
+        if !self.system.is_vector_space() {
+            return Err(NoiseError::NotAVectorSpace);
+        }
+        start_and_near(x).iter().try_for_each(|x| {
+            self.examine_terms(x)?;
+            self.examine_volume(x)
+        })
+    }
+
+    /// The sum `Σ_r a_r √(κ ρ_r) b_r` over some terms at a state.
+    pub(crate) fn noise(
+        &self,
+        x: &[f64],
+        terms: Range<usize>,
+        (strength, numbers): Drawn<'_>,
+    ) -> Option<Directions> {
+        let all = self.terms_at(x);
+        summed(self.directions(), |v| {
+            for r in terms {
+                all[r].add_to(v, (strength * all[r].rate).sqrt() * numbers(r));
+            }
+        })
+    }
+
+    /// The kinetic drift at a state.
+    pub(crate) fn drift(&self, x: &[f64]) -> Option<Directions> {
+        kinetic_drift(self.directions(), x, |x| self.terms_at(x))
+    }
+
+    /// Adds the velocity `K dS` of the friction with these covectors.
+    pub(crate) fn add_friction(&self, x: &[f64], w: &[Vec<f64>; 2], v: &mut [f64]) {
+        for term in self.terms_with(x, w) {
+            term.add_to(v, term.rate * term.along(&w[1])[0]);
+        }
+    }
+}
+
+/// A state, and one near by: the divergence of a motion may vanish at the start by a symmetry.
+pub(crate) fn start_and_near(x: &[f64]) -> [Vec<f64>; 2] {
+    let mut near = x.to_vec();
+    for (k, scale) in sizes_of_differences(x).into_iter().enumerate() {
+        near[k] += RADIUS * scale * (k as f64 + 0.5).sin();
+    }
+    [x.to_vec(), near]
+}
+
+impl<S: FrictionTerms> FromEquations<S> {
+    fn own_terms(&self) -> OwnTerms<'_> {
+        OwnTerms { system: &self.0, t: NO_CLOCK }
+    }
 }
 
 impl<S: FrictionTerms> Fluctuating<Uniform> for FromEquations<S> {
@@ -193,46 +287,17 @@ impl<S: FrictionTerms> Fluctuating<Uniform> for FromEquations<S> {
         vec![all]
     }
 
-    fn noise(
-        &self,
-        x: &Entries,
-        terms: Range<usize>,
-        (strength, numbers): Drawn<'_>,
-    ) -> Option<Directions> {
-        let all = self.terms_at(x);
-        self.summed(|v| {
-            for r in terms {
-                all[r].add_to(v, (strength * all[r].rate).sqrt() * numbers(r));
-            }
-        })
+    fn noise(&self, x: &Entries, terms: Range<usize>, drawn: Drawn<'_>) -> Option<Directions> {
+        self.own_terms().noise(x, terms, drawn)
     }
 
-    /// `Σ_r c_r b_r` with `c_r = ρ_r div b_r + ½ ⟨dρ_r, b_r⟩`.
     fn drift(&self, x: &Entries, _: usize, _: &Noise<Uniform>) -> Option<Directions> {
-        let here = self.terms_at(x);
-        let mut factors = vec![0.0; here.len()];
-        for (k, width) in half_widths(x).into_iter().enumerate() {
-            let [up, down] = [width, -width].map(|by| {
-                let mut y = x.clone();
-                y[k] += by;
-                self.terms_at(&y)
-            });
-            let quotient = |up: f64, down: f64| (up - down) / (2.0 * width);
-            for (r, factor) in factors.iter_mut().enumerate() {
-                *factor += here[r].rate * quotient(up[r].entry(k), down[r].entry(k))
-                    + 0.5 * quotient(up[r].rate, down[r].rate) * here[r].entry(k);
-            }
-        }
-        self.summed(|v| here.iter().zip(factors).for_each(|(term, c)| term.add_to(v, c)))
+        self.own_terms().drift(x)
     }
 
     fn friction(&self, x: &Entries) -> Option<Directions> {
-        let w = self.both_covectors(x);
-        self.summed(|v| {
-            for term in self.terms_with(x, &w) {
-                term.add_to(v, term.rate * term.along(&w[1])[0]);
-            }
-        })
+        let own = self.own_terms();
+        summed(own.directions(), |v| own.add_friction(x, &own.both_covectors(x), v))
     }
 
     fn has_drift(&self, _: usize, _: &Noise<Uniform>) -> bool {
@@ -247,18 +312,7 @@ impl<S: FrictionTerms> Fluctuating<Uniform> for FromEquations<S> {
         if self.0.second_law() != SecondLaw::Exact {
             return Err(NoiseError::NoiseAndPublished);
         }
-        if !self.0.is_vector_space() {
-            return Err(NoiseError::NotAVectorSpace);
-        }
-        // The divergence of a motion may vanish at the start by a symmetry.
-        let mut near = x.clone();
-        for (k, scale) in sizes_of_differences(x).into_iter().enumerate() {
-            near[k] += RADIUS * scale * (k as f64 + 0.5).sin();
-        }
-        [x, &near].into_iter().try_for_each(|x| {
-            self.examine_terms(x)?;
-            self.examine_volume(x)
-        })
+        self.own_terms().examine(x)
     }
 
     fn check_start_alone(&self, x0: &Entries) -> Result<(), ModelError> {
@@ -327,7 +381,8 @@ mod tests {
     #[test]
     fn a_motion_that_changes_the_volume_by_a_millionth_is_refused() {
         let changes = |part: f64| {
-            let verdict = FromEquations(Compressed(part)).examine_volume(&[0.7, 1.2, 0.3]);
+            let system = OwnTerms { system: &Compressed(part), t: NO_CLOCK };
+            let verdict = system.examine_volume(&[0.7, 1.2, 0.3]);
             matches!(verdict, Err(NoiseError::NotUnimodular { .. }))
         };
         // The divergence is 2.2 times this part, of terms of the size 4.3.

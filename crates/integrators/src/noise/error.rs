@@ -96,6 +96,30 @@ pub enum NoiseError {
         /// The number of directions.
         directions: usize,
     },
+    /// A system of your own has another number of baths than its noise knows of.
+    #[error(
+        "the system has {found} baths, and its noise knows the contacts of {expected}: give `with_noise` a number of contacts for each bath, \
+         after the last bath was added"
+    )]
+    OtherBaths {
+        /// How many baths there are.
+        found: usize,
+        /// Of how many baths the numbers of contacts are known.
+        expected: usize,
+    },
+    /// A bath of a system of your own lists another number of contacts than its noise knows of.
+    #[error(
+        "the friction of bath {bath}, counted from 0, lists {found} contacts at the start of the run or near it, where `with_noise` says \
+         {expected}: each has a random number, so list as many at every state, with the rate zero where there is none"
+    )]
+    OtherContacts {
+        /// The number of the bath among the baths.
+        bath: usize,
+        /// How many contacts are listed.
+        found: usize,
+        /// How many there are to be.
+        expected: usize,
+    },
     /// The terms of the friction of a system of your own are not those of its motion.
     #[error(
         "the terms of `FrictionTerms` break {law} by {off:.1e}, of {size:.1e}: the noise would be that of another friction"

@@ -1,14 +1,15 @@
 //! Ports, baths and a clock around a system of your own, in plain numbers.
 
+mod noise;
+
 use std::fmt;
 use std::sync::Arc;
 
+use metriplectic_dynamics::ModelError;
 use metriplectic_dynamics::exchange::Temperature;
-use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{
-    Apart, Covectors, ENERGY, ENTROPY, Equations, Kind, Part, Path, Paths, PointError, Report,
-    Sizes, Terms,
+    Apart, Covectors, ENERGY, ENTROPY, Equations, Part, Path, Paths, Report, Sizes, Terms,
 };
 
 use super::state::{Ledger, OpenState};
@@ -69,7 +70,8 @@ struct Effect {
 /// with the motion `f` of the system. The laws are those of [open systems](crate::open), on every step of every method. Implicit
 /// methods ask for the [parts](metriplectic_equations::Differences) of the system. Where the energy depends
 /// on time the system says so ([`Equations::energy_depends_on_time`]) and answers [`Equations::power`], and the work `W_t` of the time is
-/// booked.
+/// booked. Runs have [tangents](crate::Tangents), of the ledger too, and [`with_noise`](Self::with_noise) gives the system and its baths
+/// thermal noise.
 ///
 /// ```
 /// use metriplectic_equations::{ENERGY, ENTROPY, Equations, Sizes};
@@ -134,6 +136,8 @@ pub struct OpenEquations<S> {
     verified: bool,
     /// A ledger without entries.
     empty: Ledger,
+    /// How many contacts each bath has, if it has noise.
+    contacts: Vec<usize>,
 }
 
 // By hand, because systems and closures have no `Debug`.
@@ -149,7 +153,13 @@ impl<S: Equations> FromEquations<S> {
     /// depend on time ([`Equations::energy_depends_on_time`]), and so may its motion.
     pub fn opened(self) -> OpenEquations<S> {
         let empty = Ledger::of([]);
-        OpenEquations { system: self.0, parts: Vec::new(), verified: false, empty }
+        OpenEquations {
+            system: self.0,
+            parts: Vec::new(),
+            verified: false,
+            empty,
+            contacts: Vec::new(),
+        }
     }
 }
 
@@ -293,50 +303,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// The parts of a model.
 struct OfModel<'a>(&'a dyn Equations);
 
-impl Equations for OfModel<'_> {
-    fn sizes(&self) -> Sizes {
-        self.0.sizes()
-    }
-
-    fn values(&self, t: f64, x: &[f64], values: &mut [f64]) {
-        self.0.values(t, x, values);
-    }
-
-    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
-        self.0.differentials(t, x, values, w);
-    }
-
-    fn velocity(&self, t: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
-        self.0.velocity(t, x, v)
-    }
-
-    fn second_law(&self) -> SecondLaw {
-        self.0.second_law()
-    }
-
-    fn kind(&self, invariant: usize) -> Kind {
-        self.0.kind(invariant)
-    }
-
-    fn check(&self, x: &[f64]) -> Result<(), PointError> {
-        self.0.check(x)
-    }
-
-    fn defect(&self, x: &[f64]) -> f64 {
-        self.0.defect(x)
-    }
-
-    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
-        self.0.scales(x, sizes);
-    }
-
-    fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
-        self.0.chart(x, q, y);
-    }
-
-    fn coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) -> bool {
-        self.0.coordinates(x, y, q)
-    }
+metriplectic_equations::answered_by! {
+    ['a] OfModel<'a>: this => this.0, |of: &dyn Equations| of.is_verified();
 }
 
 impl Apart for OfModel<'_> {

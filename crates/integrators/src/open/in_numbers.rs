@@ -10,8 +10,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_equations::{
-    Apart, Covectors, Differences, Equations, Kind, MetricError, Part, Path, PathAt, PathSlopes,
-    Paths, PointError, Sizes,
+    Apart, Covectors, Differences, Equations, Kind, Part, Path, Paths, PointError, Sizes,
 };
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
@@ -251,69 +250,9 @@ impl<F: OpenFlow> Driven<'_, F> {
     }
 }
 
-/// The paths of the points, which do not depend on time.
-impl<F: OpenFlow> Paths for Driven<'_, F> {
-    fn follows(&self, path: Path) -> bool {
-        self.along(|paths| paths.follows(path))
-    }
-
-    fn path(
-        &self,
-        path: Path,
-        x: &[f64],
-        u: &[f64],
-        to: &mut PathAt<'_>,
-    ) -> Result<(), MetricError> {
-        self.along(|paths| paths.path(path, x, u, to))
-    }
-
-    fn path_jet(
-        &self,
-        path: Path,
-        x: &[f64],
-        u: &[f64],
-        to: (&mut PathAt<'_>, &mut PathSlopes<'_>),
-    ) -> Result<(), MetricError> {
-        self.along(|paths| paths.path_jet(path, x, u, to))
-    }
-
-    fn end(&self, path: Path, x: &[f64], u: &[f64], end: &mut [f64]) -> Result<(), MetricError> {
-        self.along(|paths| paths.end(path, x, u, end))
-    }
-
-    fn curve(
-        &self,
-        path: Path,
-        start: (&[f64], &[f64], f64),
-        y: &mut [f64],
-        to: [&mut [f64]; 2],
-    ) -> Result<(), MetricError> {
-        self.along(|paths| paths.curve(path, start, y, to))
-    }
-
-    fn lost_digits(&self, path: Path, x: &[f64], u: &[f64], end: &[f64], lost: &mut [f64]) {
-        self.along(|paths| paths.lost_digits(path, x, u, end, lost));
-    }
-
-    fn accuracy(&self, path: Path) -> f64 {
-        self.along(|paths| paths.accuracy(path))
-    }
-
-    fn velocity_at(&self, y: &[f64], x: &[f64], q: &[f64], v: &[f64], to: &mut [f64]) {
-        self.along(|paths| paths.velocity_at(y, x, q, v, to));
-    }
-
-    fn turned(&self, y: &[f64], x: &[f64], q: &[f64], columns: &mut [f64]) {
-        self.along(|paths| paths.turned(y, x, q, columns));
-    }
-
-    fn transport(&self, x: &[f64], y: &[f64], vectors: &mut [f64]) {
-        self.along(|paths| paths.transport(x, y, vectors));
-    }
-
-    fn pairing_size(&self, w: &[f64], v: &[f64]) -> f64 {
-        self.along(|paths| paths.pairing_size(w, v))
-    }
+metriplectic_equations::follows_paths! {
+    /// The paths of the points, which do not depend on time.
+    [F: OpenFlow] Driven<'_, F>: along
 }
 
 /// The work of the time in a step of an open flow.

@@ -32,7 +32,7 @@ pub enum Compiled {
         /// Its name in a checkpoint.
         name: fn() -> String,
         /// The path and the discrete gradient.
-        line: LineOfStep,
+        line: PathOfStep,
         /// Solves the equation of a step.
         newton: Newton,
         /// How often a step that is not solved is split in halves.
@@ -53,7 +53,7 @@ pub enum Compiled {
 /// The step of a scheme: the path of a retraction of this library, and a discrete gradient.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineOfStep {
+pub struct PathOfStep {
     /// The path: a straight line on a vector space.
     pub path: Path,
     /// The discrete gradient.

@@ -1,5 +1,6 @@
 //! Families with surroundings: ports, baths, a clock and noise, which depend on the parameters too.
 
+use std::convert::Infallible;
 use std::fmt;
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -8,15 +9,16 @@ use metriplectic_dynamics::exchange::{Bath, Named, Port};
 use metriplectic_dynamics::family::Freeze;
 use metriplectic_dynamics::noise::Fluctuation;
 use metriplectic_dynamics::{
-    Family, FamilyBuilder, Frozen, Parametrised, Surroundings, SystemBuilder,
+    Family, FamilyBuilder, Frozen, Parametrised, Surroundings, SystemBuilder, system::Point,
 };
 use metriplectic_fields::{Real, Scalar, ScalarField, Space, Velocity};
 use metriplectic_manifolds::{Euclidean, Manifold, Product, Times};
 use nalgebra::SVector;
 
-use super::systems::SystemAt;
+use super::systems::{SystemAt, Systems};
 use crate::noise::{Fluctuates, Noise};
 use crate::open::{AtTime, OfTime, Opening, Timed, With};
+use crate::step::{Element, Flow};
 
 /// A function of the parameters.
 type OfParameters<Q, const P: usize> = dyn Fn(&SVector<f64, P>) -> Q + Send + Sync;
@@ -321,7 +323,7 @@ where
 }
 
 /// A [`Family`] `Y` with surroundings: ports, baths, an energy that depends on time, noise; built by the words of
-/// [`FamilySurroundings`].
+/// [`FamilySurroundings`]. `Fit::of` and `Loss::of` take it as they take a closed family ([`Fittable`]).
 pub struct OpenFamily<Y, Q, const P: usize> {
     family: Y,
     surroundings: SurroundingsOf<Q, P>,
@@ -357,5 +359,54 @@ where
             (self.surroundings.at)(theta).around(closed)
         };
         SystemAt::new(self.names(), theta, build(&theta), move |theta| Ok(build(theta)))
+    }
+}
+
+/// Builds a member of a family at values of its `P` parameters.
+pub type BuildMember<'a, S, const P: usize> =
+    Box<dyn Fn(&SVector<f64, P>) -> Result<S, Infallible> + 'a>;
+
+/// A family whose parameters are fitted: a closed one, whose members have exact derivatives along them, or one with surroundings.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no family with {P} parameters",
+    note = "other systems with parameters are fitted by `Fit::of_systems`, from a closure that builds the system at values of them"
+)]
+pub trait Fittable<const P: usize> {
+    /// The systems of a fit: a closed family itself, or [`Systems`] whose derivatives are differences of runs.
+    type Systems<'a>
+    where
+        Self: 'a;
+    /// A state at the start of a run.
+    type Start;
+
+    /// Returns the systems of a fit.
+    fn systems(&self) -> Self::Systems<'_>;
+}
+
+impl<Y: Parametrised<P>, const P: usize> Fittable<P> for Y {
+    type Systems<'a>
+        = &'a Y
+    where
+        Self: 'a;
+    type Start = Point<Y::System>;
+
+    fn systems(&self) -> &Self {
+        self
+    }
+}
+
+impl<W, N, Q, const P: usize> Fittable<P> for OpenFamily<Family<W, P>, Q, P>
+where
+    Family<W, P>: Parametrised<P, System = Frozen<N, W, P>>,
+    Q: Surroundings<Built<N>: Flow>,
+{
+    type Systems<'a>
+        = Systems<BuildMember<'a, Q::Built<N>, P>, P>
+    where
+        Self: 'a;
+    type Start = Element<Q::Built<N>>;
+
+    fn systems(&self) -> Self::Systems<'_> {
+        Systems::new(*self.names(), Box::new(|theta| Ok(self.at(*theta).into_system())))
     }
 }

@@ -2,6 +2,7 @@
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
+use metriplectic_equations::Equations;
 use metriplectic_fields::{Column as _, Jet1, Real, ScalarField, Space, Vector};
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +11,7 @@ use super::differentiated::Differentiated;
 use super::frames::between;
 use super::smooth::{SmoothFlow, matrix, numbers};
 use super::state::TangentState;
-use crate::open::{Clock, OpenSpace, OpenState, OpenSystem, StateOf};
+use crate::open::{Clock, OpenEquations, OpenSpace, OpenState, OpenSystem, StateOf};
 use crate::step::{Flow, Laws, StateSpace, Stepper, Vector as _};
 
 impl<Y, C, X> SmoothFlow for OpenSystem<Y, C, X>
@@ -133,3 +134,110 @@ impl<M: StateSpace, F: Flow<Space = OpenSpace<M>>> TangentState<F> {
         self.booked_along(0)
     }
 }
+
+/// Gives the flow `$flow` around points, with states `$moving` that carry derivatives, the questions of derivatives, and its runs derivatives
+/// by differences of steps. The flow of its points has answers to these questions at each time.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! smooth_open_flow {
+    ([$($generics:tt)*] $flow:ty, moving: $moving:ty) => {
+        impl<$($generics)*> $crate::tangent::SmoothFlow for $flow {
+            type Moving = $moving;
+
+            fn directions(&self) -> usize {
+                // The clock, the work of the time, and what ports and baths book.
+                $crate::tangent::SmoothFlow::directions(&$crate::open::OpenFlow::at(self, 0.0))
+                    + 1
+                    + $crate::open::OpenFlow::empty(self).entry_sizes().len()
+            }
+
+            fn clock(&self) -> Option<usize> {
+                Some($crate::tangent::SmoothFlow::directions(&$crate::open::OpenFlow::at(self, 0.0)))
+            }
+
+            fn power_of_time(&self, x: &$crate::Element<Self>) -> Option<(usize, f64)> {
+                let work = $crate::tangent::SmoothFlow::clock(self)? + 1;
+                let power = || $crate::open::OpenFlow::power(self, x.time, &x.x);
+                $crate::open::OpenFlow::has_clock(self).then(|| (work, power()))
+            }
+
+            /// The differentials of the balance `H − W − Q` and of `S + Σ S_b`. The clock moves neither: the frozen work is booked.
+            fn law_rows(
+                &self,
+                x: &$crate::Element<Self>,
+            ) -> $crate::tangent::LawRows<nalgebra::DVector<f64>> {
+                let points = $crate::open::OpenFlow::at(self, x.time);
+                let n = $crate::tangent::SmoothFlow::directions(&points);
+                let all = $crate::tangent::SmoothFlow::directions(self);
+                let rows = $crate::tangent::SmoothFlow::law_rows(&points, &x.x);
+                let mut rows = rows.map(|row| row.clone().resize_vertically(all, 0.0));
+                let ledger = $crate::open::OpenFlow::empty(self);
+                for booked in n + 1..all {
+                    let entry = |i: usize| if i == booked { 1.0 } else { 0.0 };
+                    let entries: Vec<f64> = (n + 1..all).map(entry).collect();
+                    let none = $crate::Laws { energy: 0.0, entropy: 0.0, invariants: [(); 0] };
+                    let laws = ledger.with_entries(&entries).balanced(none);
+                    rows.set(booked, laws.energy, laws.entropy);
+                }
+                rows
+            }
+
+            fn turn(
+                &self,
+                from: &$crate::Element<Self>,
+                to: &$crate::Element<Self>,
+            ) -> Option<nalgebra::DMatrix<f64>> {
+                let points = $crate::open::OpenFlow::at(self, to.time);
+                let turn = $crate::tangent::SmoothFlow::turn(&points, &from.x, &to.x)?;
+                let all = $crate::tangent::SmoothFlow::directions(self);
+                let mut whole = nalgebra::DMatrix::identity(all, all);
+                whole.view_mut((0, 0), turn.shape()).copy_from(&turn);
+                Some(whole)
+            }
+
+            fn differential(
+                &self,
+                f: &dyn Fn(&$moving) -> metriplectic_fields::Real,
+                x: &$crate::Element<Self>,
+            ) -> (f64, nalgebra::DVector<f64>) {
+                let points = $crate::open::OpenFlow::at(self, x.time);
+                let (value, df) = $crate::tangent::SmoothFlow::differential(&points, f, &x.x);
+                (value, df.resize_vertically($crate::tangent::SmoothFlow::directions(self), 0.0))
+            }
+
+            fn moving(&self, x: &$crate::Element<Self>, v: &nalgebra::DVector<f64>) -> $moving {
+                let points = $crate::open::OpenFlow::at(self, x.time);
+                let n = $crate::tangent::SmoothFlow::directions(&points);
+                $crate::tangent::SmoothFlow::moving(&points, &x.x, &v.rows(0, n).into_owned())
+            }
+
+            fn coordinates(&self, y: &$crate::Element<Self>, there: &$moving) -> Vec<[f64; 2]> {
+                let points = $crate::open::OpenFlow::at(self, y.time);
+                $crate::tangent::SmoothFlow::coordinates(&points, &y.x, there)
+            }
+        }
+
+        /// By differences of steps.
+        impl<$($generics)*, M: $crate::Stepper<$flow>> $crate::tangent::Differentiated<M> for $flow {
+            type MovingWide = $moving;
+
+            fn moved_along(
+                &self,
+                x: &$crate::Element<Self>,
+                v: &nalgebra::DVector<f64>,
+            ) -> $moving {
+                $crate::tangent::SmoothFlow::moving(self, x, v)
+            }
+
+            fn coordinates_around(
+                &self,
+                y: &$crate::Element<Self>,
+                there: &$moving,
+            ) -> Vec<[f64; 2]> {
+                $crate::tangent::SmoothFlow::coordinates(self, y, there)
+            }
+        }
+    };
+}
+
+crate::smooth_open_flow! { [S: Equations] OpenEquations<S>, moving: Vec<Real> }

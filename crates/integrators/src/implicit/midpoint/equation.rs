@@ -10,13 +10,13 @@ use crate::implicit::velocity::{VelocityJet, velocity_jet, whole_velocity_jet};
 use crate::newton::Stiffness;
 use crate::numbers::Lengths;
 use crate::round_off::bound::{ROUNDED, is_dissipated};
-use crate::step::{Laws, LineOfStep};
+use crate::step::{Laws, PathOfStep};
 
 /// The equation `F(u) = d − h (Π̃ w_H + K̃ w_S) = 0` of the initial displacement `u` of the path of a step from `x`. On a vector space
 /// the path is a straight line, and `d = u`.
 pub(super) struct Equation<'a, L: Lengths> {
     pub(super) parts: &'a Parts<'a, L>,
-    pub(super) line: LineOfStep,
+    pub(super) line: PathOfStep,
     pub(super) x: &'a L::State,
     pub(super) h: f64,
     /// The laws at `x`.

@@ -6,7 +6,7 @@ use super::equation::{Equation, FromEnd};
 use crate::implicit::drift;
 use crate::implicit::parts::{Parts, is_flat};
 use crate::numbers::{AtRunTime, List as _};
-use crate::step::{Entries, LineOfStep};
+use crate::step::{Entries, PathOfStep};
 
 /// The equation of the step of size `h` between two states of a model, along its end; `None` where it has no derivatives, and off vector spaces with the canonical metric.
 ///
@@ -14,7 +14,7 @@ use crate::step::{Entries, LineOfStep};
 /// displacements and the same discrete gradients, so that the residual of one is that of the other less its sign.
 pub(crate) fn from_end(
     model: &dyn Model,
-    line: LineOfStep,
+    line: PathOfStep,
     [x, end]: [&[f64]; 2],
     h: f64,
 ) -> Option<FromEnd<AtRunTime>> {

@@ -18,7 +18,7 @@ use crate::newton::Newton;
 use crate::numbers::Lengths;
 use crate::round_off::bound::{BROKEN, breaks_first_law};
 use crate::step::failure::{Cause, Fallbacks, smallest_part};
-use crate::step::{Effort, Evidence, Laws, LineOfStep, StepError};
+use crate::step::{Effort, Evidence, Laws, PathOfStep, StepError};
 
 /// The midpoint scheme with its options.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ pub(crate) struct Midpoint {
     /// Its name in a checkpoint.
     pub(crate) name: fn() -> String,
     /// Its path and its discrete gradient; none for those of one's own, of which plain numbers know nothing.
-    pub(crate) line: Option<LineOfStep>,
+    pub(crate) line: Option<PathOfStep>,
     /// Solves the equation of a step.
     pub(crate) newton: Newton,
     /// How often a step that is not solved is split in halves.
@@ -98,7 +98,7 @@ fn has_digits<L: Lengths>(
 }
 
 impl Midpoint {
-    fn line(&self) -> LineOfStep {
+    fn line(&self) -> PathOfStep {
         self.line.expect("a run refuses schemes of one's own")
     }
 

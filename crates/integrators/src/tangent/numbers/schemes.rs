@@ -20,10 +20,10 @@ use super::units::{differential, first_law, relative, scaled, units};
 use super::{Derivative, StepOfModel};
 use crate::implicit::{FromEnd, from_end};
 use crate::numbers::AtRunTime;
-use crate::step::{GradientKind, LineOfStep};
+use crate::step::{GradientKind, PathOfStep};
 
 /// Returns whether a step is the same seen from either end.
-pub(in crate::tangent) fn is_self_adjoint(line: LineOfStep) -> bool {
+pub(in crate::tangent) fn is_self_adjoint(line: PathOfStep) -> bool {
     line.path != Path::Exponential && line.gradient != GradientKind::ItohAbe
 }
 
@@ -41,7 +41,7 @@ struct Both {
 /// The equation of a step along its end, and that of the opposite step along the start.
 fn from_both_ends(
     step: &StepOfModel<'_>,
-    line: LineOfStep,
+    line: PathOfStep,
 ) -> Result<[FromEnd<AtRunTime>; 2], Unlinearised> {
     if !is_self_adjoint(line) {
         return Err(Unlinearised::NotSymmetric);
@@ -53,7 +53,7 @@ fn from_both_ends(
 }
 
 impl Both {
-    fn of(step: &StepOfModel<'_>, line: LineOfStep) -> Result<Self, Unlinearised> {
+    fn of(step: &StepOfModel<'_>, line: PathOfStep) -> Result<Self, Unlinearised> {
         let units = units(step);
         let [there, back] = from_both_ends(step, line)?;
         let column = |v: &[f64]| DVector::from_column_slice(v);
@@ -98,7 +98,7 @@ impl Both {
 /// [`Unlinearised`] if the step is not symmetric, or its Jacobian is singular or not a number.
 pub(in crate::tangent) fn derivative(
     step: &StepOfModel<'_>,
-    line: LineOfStep,
+    line: PathOfStep,
 ) -> Result<Derivative, Unlinearised> {
     Both::of(step, line)?.derivative(step.h).ok_or(Unlinearised::Singular)
 }
@@ -110,7 +110,7 @@ pub(in crate::tangent) fn derivative(
 /// [`Unlinearised`] as for the [derivative], and if `dH(x') J` is not `dH(x)`.
 pub(in crate::tangent) fn pull_back(
     step: &StepOfModel<'_>,
-    line: LineOfStep,
+    line: PathOfStep,
     costate: &[f64],
 ) -> Result<DVector<f64>, Unlinearised> {
     let both = Both::of(step, line)?;
@@ -126,7 +126,7 @@ pub(in crate::tangent) fn pull_back(
 /// its end, relative to its terms. `None` if the entropy has no discrete gradient, or the step has no derivative.
 pub(in crate::tangent) fn entropy_law(
     step: &StepOfModel<'_>,
-    line: LineOfStep,
+    line: PathOfStep,
     [before, after]: [&[f64]; 2],
 ) -> Option<f64> {
     let &StepOfModel { model, x, end, .. } = step;

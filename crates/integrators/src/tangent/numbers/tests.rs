@@ -21,20 +21,20 @@ use super::units::{differential, units};
 use super::*;
 use crate::collocation::tableau::{GAUSS, RADAU};
 use crate::collocation::{STAGES, Tableau};
-use crate::step::{Dim, Flow as _, GradientKind, Inlined, LineOfStep};
+use crate::step::{Dim, Flow as _, GradientKind, Inlined, PathOfStep};
 use crate::tangent::Unlinearised;
 use crate::{FromEquations, Gauss, MeanValue, Method, Radau, Scheme, Span, SymmetricItohAbe};
 
 /// A method in plain numbers.
 #[derive(Clone, Copy, Debug)]
 enum Steps {
-    Along(LineOfStep),
+    Along(PathOfStep),
     With(&'static Tableau),
 }
 
 impl Steps {
     fn along(gradient: GradientKind) -> Self {
-        Self::Along(LineOfStep { path: Path::Weyl, gradient })
+        Self::Along(PathOfStep { path: Path::Weyl, gradient })
     }
 
     fn name(self) -> String {
@@ -649,7 +649,7 @@ fn a_scheme_that_is_not_symmetric_is_refused() {
     let step = step_of(&numbers, [&x, &end], 0.3, &targets);
     let lines = [(Path::Weyl, GradientKind::ItohAbe), (Path::Exponential, GradientKind::Gonzalez)];
     for (path, gradient) in lines {
-        let steps = Steps::Along(LineOfStep { path, gradient });
+        let steps = Steps::Along(PathOfStep { path, gradient });
         let costate = DVector::zeros(2);
         assert_eq!(steps.derivative(&step).unwrap_err(), Unlinearised::NotSymmetric);
         assert_eq!(steps.pull_back(&step, &costate).unwrap_err(), Unlinearised::NotSymmetric);

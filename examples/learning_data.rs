@@ -114,7 +114,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let panel = |name: &str, lines: &[Vec<(f64, f64)>]| {
         lines.iter().fold(Panel::new(name, "t"), |panel, line| panel.line("runs", line))
     };
+    // The first run: where the masses go, from the pivot at the origin.
+    let along = |i: usize| -> Vec<(f64, f64)> {
+        entries[i][0].iter().zip(&entries[i + 1][0]).map(|(x, y)| (x.1, y.1)).collect()
+    };
+    let motion = Panel::new("y", "x").title("one run").equal();
     let figure = Panels::new(format!("A training set of {RUNS} runs with both laws exact"))
+        .columns(2)
+        .panel(motion.line("q₁", along(0)).line("q₂", along(2)))
         .panel(panel("relative error of H", &energies))
         .panel(panel("relative error of L", &momenta))
         .panel(panel("entropy S", &entropies));

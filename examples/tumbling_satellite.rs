@@ -9,11 +9,13 @@
 //! `B dS = −N w`, with the temperature `T = w_s` the equations are
 //! `R' = R Ω̃^`, `p' = p × Ω̃`, `s' = γ |p × Ω|²`, with `Ω̃ = Ω + γT p × Ω`. Listed as three momenta `Rp` is kept
 //! by the steps too. The least kinetic energy is `½|p|²/I₁`: the end is a spin about the axis `e₁`.
+//!
+//! Observables of each step are streamed to a file, which Ctrl-C leaves whole: try `--steps 1000000000`.
 
-use std::error::Error;
+use std::{error::Error, fs::File};
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Example, Globe, Panels};
+use metriplectic_studies::{Example, Gallery, Globe, Panels, Progress, Record, interrupted};
 
 const INERTIA: Vector3<f64> = Vector3::new(3.0, 2.5, 1.0);
 const CAPACITY: f64 = 4.0;
@@ -44,10 +46,32 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let about = "A satellite goes into a flat spin: attitude, momentum and heat.";
     let example = Example::new(about, 2000, 0.05);
-    let run = example.run(&satellite, start, example.span())?;
-
     let kinetic = |state: &State<Space>| spin(&state.point.0.1.cast()).re;
     let momentum = |state: &State<Space>| (state.point.0.0 * state.point.0.1 - p0).norm();
+    let span = example.span();
+    let mut steps = WeylMidpoint.steps(&satellite, start, span)?;
+    let watch = Observables::on(&satellite)
+        .of_state("kinetic_energy", kinetic)
+        .of_state("momentum_error", momentum)
+        .of_state("entropy", |state| state.entropy);
+    let mut table = watch.csv(File::create(Gallery::open()?.path("tumbling_satellite.csv"))?)?;
+    table.write(steps.state())?;
+    let mut states = vec![steps.state().clone()];
+    let mut progress = Progress::over(example.steps);
+    for step in 1..=example.steps {
+        table.write(steps.advance()?)?;
+        if span.records(step) {
+            states.push(steps.state().clone());
+        }
+        progress.step();
+        if interrupted() {
+            break;
+        }
+    }
+    drop(progress);
+    table.finish()?;
+    let run = Record { states, certificate: steps.certificate().clone() };
+
     let flat = 0.5 * p0.norm_squared() / INERTIA.x;
     let axis = run.states.iter().map(|s| s.point.0.0.column(2).into_owned());
     let title = format!("A satellite goes into a flat spin, h = {}", example.step_size);
@@ -59,5 +83,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         .panel(run.energy_error())
         .panel(run.panel("momentum |Rp − p₀|", momentum));
     let energies = vec![kinetic(&run.states[0]), kinetic(run.last()), flat];
-    example.report(&run).with("kinetic_energies", energies).figure(figure).print()
+    let report = example.report(&run).with("time", steps.state().time);
+    report.with("kinetic_energies", energies).figure(figure).print()
 }

@@ -7,7 +7,10 @@ use metriplectic::integrators::Residual;
 use metriplectic::manifolds::Tangent;
 use metriplectic::prelude::*;
 use metriplectic_studies::{Claim, Drift, Growth, Guarantee, scientific};
-use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
+use models::{
+    PENDULUM, State10, TUMBLING, UNSTABLE, angular_momentum, free_body, half_square, heat_exchange,
+    kinetic, pendulum_bracket, pendulum_energy, relaxing_body, top,
+};
 
 const MILLION: usize = 1_000_000;
 
@@ -139,6 +142,26 @@ fn the_energy_of_a_forced_body_is_conserved_over_a_hundred_thousand_steps() {
     // The motion does not die out: the last digits of H are those of a state that moves.
     let speed = system.velocity(&ChartPoint::<_, f64>::centre(&run.last().point)).unwrap().norm();
     assert!(speed > 1e-2, "{speed:.1e}");
+}
+
+#[test]
+fn a_thermoelastic_pendulum_keeps_both_laws_and_its_momentum_over_a_hundred_thousand_steps() {
+    let system = System::on(Euclidean::<10>)
+        .bracket(Poisson::constant(pendulum_bracket()).unwrap())
+        .energy(pendulum_energy)
+        .entropy(|x: &State10| x[8] + x[9])
+        .dissipation(FieldDissipation(heat_exchange))
+        .momentum(angular_momentum)
+        .build()
+        .unwrap();
+    let span = Span::steps(0.05, 100_000).at_most(2);
+    let run = WeylMidpoint.run(&system, SVector::from(PENDULUM), span).unwrap();
+    let certificate = run.certificate();
+    println!("{certificate}");
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+    assert!(certificate.max_relative_energy_error() <= 50.0 * f64::EPSILON, "{certificate}");
+    assert!(certificate.keeps_invariants(), "{certificate}");
+    assert!(certificate.invariants[0].max_error <= 5e-14, "{certificate}");
 }
 
 #[test]

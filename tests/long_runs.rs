@@ -217,3 +217,22 @@ fn a_jacobian_of_earlier_steps_leaves_no_trend() {
     }
     assert!(nambu.entropy.worst() <= 5e-15, "{}", nambu.entropy);
 }
+
+#[test]
+fn a_long_run_of_order_8_reaches_the_flow_in_twice_the_digits() {
+    let span = Span::until(1e4).tolerance(1e-8).largest_step(1.0);
+    let run = DormandPrince8.run(&gas(1e-3), Vector4::new(1.0, 2.0, 2.0, 2.0), span);
+    let run = run.expect("every step is taken");
+    let certificate = run.certificate();
+    println!("{certificate}");
+    assert!(certificate.max_relative_energy_error() <= 5e-15, "{certificate}");
+    assert!(certificate.min_entropy_increment > 0.0, "{certificate}");
+    // By `benches/peers`. The errors of the steps add up to a phase that is off by some 10⁻⁶.
+    let flow = Vector4::new(
+        0.697_372_907_244_776,
+        0.543_261_789_486_713,
+        3.526_959_397_033_727,
+        2.325_473_917_008_12,
+    );
+    assert!((run.last().point - flow).norm() < 1e-5, "{}", run.last().point - flow);
+}

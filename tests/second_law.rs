@@ -154,6 +154,30 @@ fn the_relaxing_body_rests_at_its_equilibrium_without_a_fall_of_entropy() {
     assert!((end.x.abs() - 1.414_217_451_455_044).abs() < 1e-12 && end.yz().norm() < 1e-7, "{end}");
 }
 
+/// A spin in the field `e₃` gives all of its energy to a bath: at rest `n = e₃` and `T = (H₀ + 1)/c`.
+#[test]
+fn a_spin_heats_its_bath_until_it_lies_in_the_field() {
+    const CAPACITY: f64 = 20.0;
+    type Spin = (Vector3<Real>, Vector1<Real>);
+    let spin = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, s): &Spin| n.x.powi(2) * 0.25 - n.z + (s.x / CAPACITY).exp())
+        .entropy(|(_, s): &Spin| s.x)
+        .build()
+        .expect("the parts make a system");
+    let start = (vector![0.48, 0.36, -0.8], Vector1::new(0.0));
+    let run = WeylMidpoint.run(&spin, start, Span::steps(0.1, 1000)).expect("it runs");
+    let (certificate, (n, s)) = (run.certificate(), run.last().point);
+    println!("{certificate}");
+    assert_eq!(certificate.second_law, SecondLaw::Exact);
+    assert!(certificate.keeps_entropy() && certificate.min_entropy_increment >= 0.0);
+    assert!(certificate.max_relative_energy_error() <= 1e-14, "{certificate}");
+    let (temperature, rest) =
+        ((s.x / CAPACITY).exp() / CAPACITY, (certificate.initial_energy + 1.0) / CAPACITY);
+    // What is left of the energy, `1 − n₃` and less, in units of the heat capacity.
+    assert!(n.z > 1.0 - 1e-7 && (temperature - rest).abs() < 1e-8, "{n} {temperature} {rest}");
+}
+
 #[test]
 fn every_problem_keeps_its_entropy_for_a_few_more_iterations() {
     // The report has more steps; what breaks the second law breaks it in few.

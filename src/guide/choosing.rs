@@ -188,5 +188,5 @@
 //! # }
 //! ```
 //!
-//! Two examples show more: `spin_in_a_bath` is a spin with a bath on `S² × R`, with the brackets `(AreaForm, Zero)`;
+//! Two examples show more: `spin_helix` has spins with a bath on `S² × R`, with the brackets `(AreaForm, Zero)`;
 //! `rotations` has only an energy and an entropy on SO(3).

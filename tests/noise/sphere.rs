@@ -77,6 +77,12 @@ fn the_law_of_a_nanoparticle_in_si_units() {
     )
     .against("Langevin's function coth x − 1/x")
     .record(scientific(error), "1e-4");
+    // Along a path the energy, of some kT, is the heat of the crystal.
+    let span = Span::steps(0.2 / (RATIO * FIELD.norm()), 2000);
+    let start = spin.flow().start(vector![0.0, 0.6, 0.8]);
+    let path = NinomiyaVictoir(DormandPrince5).seed(7).run(&spin, start, span).unwrap();
+    let off = path.certificate().max_energy_error / (K_B * TEMPERATURE);
+    assert!(off < 1e-13, "{off:e}");
     let (one, _) = measure((&[0.1, 0.05, 0.025], 0.0), |h, n, outcome| {
         let method = RandomFlow(DormandPrince5).numbers(outcome.clone());
         step(&spin, &method, &spin.flow().start(*n), h).x

@@ -218,11 +218,14 @@ fn every_run_takes_as_many_steps_as_it_is_asked_for() {
     }
 }
 
+/// The name of a number, and where it lies.
+type Figure<'a, R = RangeInclusive<f64>> = (&'a str, R);
+
 #[test]
 fn reports_have_the_figures_of_closed_forms() {
     let about = |value: f64, by: f64| value - by..=value + by;
     let most = |most: f64| -most..=most;
-    let figures: [(&str, &[(&str, RangeInclusive<f64>)]); 16] = [
+    let figures: [(&str, &[Figure<'_>]); 16] = [
         ("chaplygin_sleigh", &[("order", about(2.0, 0.01))]),
         // Of the 102 nm where the drift begins, in closed form.
         ("colloid", &[("apart", most(1e-10)), ("friction", 0.0..=10.0)]),
@@ -397,7 +400,7 @@ fn the_rotations_reach_the_reference_state() {
 #[test]
 fn invariants_are_kept_where_a_midpoint_rule_loses_one() {
     let small = 0.0..1e-13;
-    let tops: [(&str, &[(&str, Range<f64>)]); 2] = [
+    let tops: [(&str, &[Figure<'_, Range<f64>>]); 2] = [
         (
             "kovalevskaya_top",
             &[("H", small.clone()), ("n·l", small.clone()), ("|n|²", small), ("K", 0.3..0.4)],

@@ -52,16 +52,21 @@ fn chart() -> impl Metriplectic<Manifold = Chart<2>> + 'static {
         .expect("it is a system")
 }
 
-/// A ring of eight oscillators with heat: 24 variables.
-fn ring() -> impl Metriplectic<Manifold = Euclidean<24>> + 'static {
-    const SITES: usize = 8;
+/// The bracket and the entropy of eight oscillators with heat.
+const SITES: usize = 8;
+
+fn pairs() -> impl metriplectic::dynamics::Bracket<Euclidean<24>, Canonical> {
     let mut bracket = SMatrix::<f64, 24, 24>::zeros();
     for i in 0..SITES {
         (bracket[(i, SITES + i)], bracket[(SITES + i, i)]) = (1.0, -1.0);
     }
-    System::on(Euclidean::<24>)
-        .bracket(Poisson::constant(bracket).expect("it is skew"))
-        .energy(|x: &SVector<Real, 24>| {
+    Poisson::constant(bracket).expect("it is skew")
+}
+
+/// The energy of a ring of eight oscillators with heat: 24 variables.
+macro_rules! energy {
+    () => {
+        field!(|x: &SVector<Real, 24>| {
             let mut energy = Real::from(0.0);
             for i in 0..SITES {
                 let (q, p, s) = (x[i], x[SITES + i], x[2 * SITES + i]);
@@ -70,7 +75,27 @@ fn ring() -> impl Metriplectic<Manifold = Euclidean<24>> + 'static {
             }
             energy
         })
+    };
+}
+
+/// The ring with closures.
+fn ring() -> impl Metriplectic<Manifold = Euclidean<24>> + 'static {
+    System::on(Euclidean::<24>)
+        .bracket(pairs())
+        .energy(energy!())
         .entropy(|x: &SVector<Real, 24>| x.fixed_rows::<SITES>(2 * SITES).sum())
+        .build()
+        .expect("it is a system")
+}
+
+/// The ring with recorded fields.
+fn recorded_ring() -> impl Metriplectic<Manifold = Euclidean<24>> + 'static {
+    let space = Euclidean::<24>;
+    let entropy = field!(|x: &SVector<Real, 24>| x.fixed_rows::<SITES>(2 * SITES).sum());
+    System::on(space)
+        .bracket(pairs())
+        .energy(energy!().recorded(&space, &waves()).expect("it does not branch"))
+        .entropy(entropy.recorded(&space, &waves()).expect("it does not branch"))
         .build()
         .expect("it is a system")
 }
@@ -102,6 +127,29 @@ pub(crate) fn rows() -> Vec<Row> {
         Row::whole("ring_24/midpoint", WeylMidpoint, ring(), waves(), fixed(0.001)),
         Row::whole("ring_24/gauss_3", Gauss::<3>, ring(), waves(), fixed(0.001)),
         Row::whole("ring_24/radau_2", Radau::<2>, ring(), waves(), fixed(0.001)),
+        Row::whole(
+            "ring_24/recorded/order_5",
+            DormandPrince5,
+            recorded_ring(),
+            waves(),
+            fixed(0.001),
+        ),
+        Row::whole(
+            "ring_24/recorded/order_8",
+            DormandPrince8,
+            recorded_ring(),
+            waves(),
+            fixed(0.001),
+        ),
+        Row::whole(
+            "ring_24/recorded/midpoint",
+            WeylMidpoint,
+            recorded_ring(),
+            waves(),
+            fixed(0.001),
+        ),
+        Row::whole("ring_24/recorded/gauss_3", Gauss::<3>, recorded_ring(), waves(), fixed(0.001)),
+        Row::whole("ring_24/recorded/radau_2", Radau::<2>, recorded_ring(), waves(), fixed(0.001)),
         // Each step that is tried, with a tolerance.
         Row::whole(
             "body/tried/order_5",

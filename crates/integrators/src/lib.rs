@@ -55,7 +55,7 @@ pub mod tangent;
 mod typed;
 
 pub use attitude::{Attitude, AttitudeError};
-pub use collocation::{Gauss, Radau, StageMemory};
+pub use collocation::{Gauss, Radau};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, FlowError, RunError};
 pub use explicit::{
@@ -101,3 +101,4 @@ pub use tangent::{
     LinearisedAlong, LossGradient, SelfAdjoint, Sensitivity, SystemAt, Systems, TangentError,
     TangentEvent, TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
 };
+pub use typed::StageMemory;

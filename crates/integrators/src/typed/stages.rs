@@ -2,10 +2,9 @@
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
+use super::StageMemory;
 use super::many::{self, OfFewOrMany};
-use crate::collocation::{Gauss, Radau, StageMemory, control, dense, parts, step};
-use crate::implicit::StageNumbers;
-use crate::numbers::AtRunTime;
+use crate::collocation::{Gauss, Radau, control, dense, parts, step};
 use crate::step::failure::Fallbacks;
 use crate::step::{
     Compiled, Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
@@ -14,7 +13,7 @@ use crate::step::{
 macro_rules! of_stages {
     ($($name:ident),*) => {$(
         impl<Y: Metriplectic, const S: usize> Stepper<Y> for $name<S> {
-            type Memory = OfFewOrMany<StageMemory<Dim<Y>>, StageNumbers<AtRunTime>>;
+            type Memory = StageMemory<Dim<Y>>;
 
             const IS_IMPLICIT: bool = true;
 
@@ -47,7 +46,7 @@ macro_rules! of_stages {
                 &self,
                 start: &StepStart<'_, Y>,
                 h: f64,
-                memory: &mut <Self as Stepper<Y>>::Memory,
+                memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, StepError> {
                 // A constant, so that only one of the two is compiled.
                 if const { many::is_of_many::<Y>() } {
@@ -61,7 +60,7 @@ macro_rules! of_stages {
                 &self,
                 start: &StepStart<'_, Y>,
                 h: f64,
-                memory: &mut <Self as Stepper<Y>>::Memory,
+                memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, Refusal> {
                 if const { many::is_of_many::<Y>() } {
                     return many::attempt(&Self::in_numbers(), start, h, memory.many());
@@ -79,7 +78,7 @@ macro_rules! of_stages {
             fn error(
                 &self,
                 step: &StepEnds<'_, Y>,
-                memory: &<Self as Stepper<Y>>::Memory,
+                memory: &StageMemory<Dim<Y>>,
                 norm: impl Fn(&<Y as Flow>::Vector) -> f64,
             ) -> Option<f64> {
                 match memory {
@@ -93,7 +92,7 @@ macro_rules! of_stages {
             fn between(
                 &self,
                 step: &StepEnds<'_, Y>,
-                memory: &mut <Self as Stepper<Y>>::Memory,
+                memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
             ) -> Option<Point<Y>> {
                 if const { many::is_of_many::<Y>() } {

@@ -30,39 +30,39 @@ use crate::{Op, Recorded, book};
 /// # Ok::<(), metriplectic_recording::RecordingError>(())
 /// ```
 pub trait Branchless: Scalar {
-    /// Whether this number is less than another one.
+    /// Returns whether this number is less than another one.
     #[must_use]
     fn less(self, other: Self) -> Self;
 
-    /// Whether this number is at most another one.
+    /// Returns whether this number is at most another one.
     #[must_use]
     fn less_equal(self, other: Self) -> Self;
 
-    /// Whether this number equals another one.
+    /// Returns whether this number equals another one.
     #[must_use]
     fn equal(self, other: Self) -> Self;
 
-    /// Whether this condition and another one hold.
+    /// Returns whether this condition and another one hold.
     #[must_use]
     fn and(self, other: Self) -> Self;
 
-    /// Whether this condition or another one holds.
+    /// Returns whether this condition or another one holds.
     #[must_use]
     fn or(self, other: Self) -> Self;
 
-    /// Whether this condition does not hold.
+    /// Returns whether this condition does not hold.
     #[must_use]
     fn negated(self) -> Self;
 
-    /// `yes` if this condition holds, otherwise `no`.
+    /// Returns `yes` if this condition holds, otherwise `no`.
     #[must_use]
     fn select(self, yes: Self, no: Self) -> Self;
 
-    /// The smaller of two numbers, and this one if they are equal.
+    /// Returns the smaller of two numbers, and this one if they are equal.
     #[must_use]
     fn least(self, other: Self) -> Self;
 
-    /// The larger of two numbers, and this one if they are equal.
+    /// Returns the larger of two numbers, and this one if they are equal.
     #[must_use]
     fn greatest(self, other: Self) -> Self;
 }

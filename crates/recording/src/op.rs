@@ -105,15 +105,15 @@ operations! {
     Min 30 2 false "min",
     /// `b` if `b > a`, otherwise `a`.
     Max 31 2 false "max",
-    /// Whether `a < b`.
+    /// 1 if `a < b`, otherwise 0.
     Less 32 2 false "less",
-    /// Whether `a ≤ b`.
+    /// 1 if `a ≤ b`, otherwise 0.
     LessEqual 33 2 false "less_equal",
-    /// Whether `a = b`.
+    /// 1 if `a = b`, otherwise 0.
     Equal 34 2 false "equal",
-    /// Whether both conditions hold.
+    /// 1 if the conditions `a` and `b` hold, otherwise 0.
     And 35 2 false "and",
-    /// Whether one of both conditions holds.
+    /// 1 if the condition `a` or `b` holds, otherwise 0.
     Or 36 2 false "or",
     /// `a + k`.
     AddConstant 37 1 true "add",

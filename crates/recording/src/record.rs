@@ -39,19 +39,19 @@ pub fn record(x: &[f64], f: impl Fn(&[Recorded]) -> Vec<Recorded>) -> Result<Tap
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// It asks for the value of a number that depends on the state, and may branch on it.
+    /// The function asks for the value of a number that depends on the state, and may branch on it.
     #[error(
         "the field asks for {question} of a number that depends on the state, at {file}:{line}: what it does at another state is not on the tape. Write the choice by `Branchless::select`, or use the closure without recording it"
     )]
     Branches {
-        /// What it asks for.
+        /// The question.
         question: &'static str,
         /// The file of the question.
         file: &'static str,
         /// Its line.
         line: u32,
     },
-    /// It uses a number of another recording or of another thread.
+    /// The function uses a number of another recording or of another thread.
     #[error(
         "the field uses a number of another recording, or one that another thread computed: form all numbers within one call, from its argument"
     )]
@@ -71,9 +71,9 @@ pub enum RecordingError {
     Disagrees {
         /// The value or a component of the differential.
         quantity: &'static str,
-        /// What the tape gives.
+        /// The number of the tape.
         recorded: f64,
-        /// What the closure gives.
+        /// The number of the closure.
         closure: f64,
     },
     /// The recording is no tape.

@@ -70,7 +70,7 @@ impl<F, R> Recordable<F, R> {
     ///
     /// # Errors
     ///
-    /// Those of [`record`](crate::record()).
+    /// The errors of [`record`](crate::record()).
     pub fn tape<M>(&self, _: &M, x: &M::Point<f64>) -> Result<Tape, RecordingError>
     where
         M: PointEntries,
@@ -84,7 +84,7 @@ impl<F, R> Recordable<F, R> {
     ///
     /// # Errors
     ///
-    /// Those of [`record`](crate::record()).
+    /// The errors of [`record`](crate::record()).
     pub fn recorded_matrix<M>(
         &self,
         _: &M,
@@ -108,7 +108,7 @@ impl<F, R> Recordable<F, R> {
     ///
     /// # Errors
     ///
-    /// Those of [`record`](crate::record()), and [`RecordingError::Disagrees`] if the closure gives other numbers.
+    /// The errors of [`record`](crate::record()), and [`RecordingError::Disagrees`] if the closure gives other numbers.
     pub fn recorded<M>(
         self,
         space: &M,

@@ -12,7 +12,7 @@ use crate::book::{self, Identity};
 /// A scalar that records: each operation on it becomes an instruction of a [`Tape`](crate::Tape), by
 /// [`record`](crate::record()).
 ///
-/// It answers to all that [`Real`](metriplectic_fields::Real) answers to, so that the text of a closure compiles at it: arithmetic
+/// Every operation of [`Real`](metriplectic_fields::Real) is one of it, so that the text of a closure compiles: arithmetic
 /// with itself and with `f64` on the right, the functions of [`DualNum`](num_dual::DualNum), and the linear algebra of nalgebra.
 ///
 /// An operation on constants is done at once. A question for the value of a number that depends on the

@@ -69,7 +69,7 @@ impl Local {
                 curve(slope, -2.0 * slope / (3.0 * y * y * y))
             }
             Op::Exp => curve(y, y),
-            Op::ExpM1 => curve(y + 1.0, y + 1.0),
+            Op::ExpM1 => curve(a.exp(), a.exp()),
             Op::Ln => curve(1.0 / a, -1.0 / (a * a)),
             Op::Ln1p => {
                 let slope = 1.0 / (a + 1.0);
@@ -82,7 +82,7 @@ impl Local {
                 curve(slope, 2.0 * y * slope)
             }
             Op::Asin | Op::Acos => {
-                let slope = 1.0 / (1.0 - a * a).sqrt();
+                let slope = 1.0 / ((1.0 - a) * (1.0 + a)).sqrt();
                 let sign = if op == Op::Asin { 1.0 } else { -1.0 };
                 curve(sign * slope, sign * a * slope * slope * slope)
             }
@@ -101,11 +101,11 @@ impl Local {
                 curve(slope, -a * slope * slope * slope)
             }
             Op::Acosh => {
-                let slope = 1.0 / (a * a - 1.0).sqrt();
+                let slope = 1.0 / ((a - 1.0) * (a + 1.0)).sqrt();
                 curve(slope, -a * slope * slope * slope)
             }
             Op::Atanh => {
-                let slope = 1.0 / (1.0 - a * a);
+                let slope = 1.0 / ((1.0 - a) * (1.0 + a));
                 curve(slope, 2.0 * a * slope * slope)
             }
             Op::Abs => line(if a.is_sign_positive() { 1.0 } else { -1.0 }),

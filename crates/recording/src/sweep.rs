@@ -1,5 +1,6 @@
 //! Sweeps along a tape: forward for values, back for gradients.
 
+use std::cell::Cell;
 use std::cmp::Ordering;
 
 use metriplectic_fields::Scalar;
@@ -14,7 +15,7 @@ fn flag<D: Scalar>(holds: bool) -> D {
     D::from(if holds { 1.0 } else { 0.0 })
 }
 
-/// Whether a condition holds.
+/// Returns whether a condition holds.
 #[inline]
 fn holds<D: Scalar>(condition: &D) -> bool {
     condition.re() != 0.0
@@ -75,7 +76,7 @@ pub(crate) fn evaluate<D: Scalar>(instruction: &Instruction, r: &[D]) -> D {
     }
 }
 
-/// Whether [`Op::Min`], [`Op::Max`] and [`Op::Select`] give the first of their two alternatives.
+/// Returns whether [`Op::Min`], [`Op::Max`] and [`Op::Select`] give the first of their two alternatives.
 #[inline]
 pub(crate) fn is_chosen_first<D: Scalar>(instruction: &Instruction, r: &[D]) -> bool {
     let [a, b, _] = instruction.operands.map(|register| register as usize);
@@ -101,9 +102,10 @@ pub(crate) fn integer(k: f64) -> i32 {
 
 /// Adds the weight `w` of an instruction with the result `y` to those of its operands: `w̄_a += w ∂y/∂a`.
 #[inline(always)]
-fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &mut [f64]) {
+fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &[Cell<f64>]) {
     let &Instruction { op, operands: [a, b, c], constant: k } = instruction;
     let [a, b, c] = [a as usize, b as usize, c as usize];
+    let add = |register: usize, part: f64| bar[register].set(bar[register].get() + part);
     match op {
         Op::Constant
         | Op::Sign
@@ -113,91 +115,92 @@ fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &mut [f6
         | Op::Equal
         | Op::And
         | Op::Or => {}
-        Op::Neg | Op::ConstantSub => bar[a] -= w,
-        Op::Recip => bar[a] -= w * (y * y),
-        Op::Sqrt => bar[a] += w * 0.5 / y,
-        Op::Cbrt => bar[a] += w / (y * y * 3.0),
-        Op::Exp => bar[a] += w * y,
-        Op::ExpM1 => bar[a] += w * (y + 1.0),
-        Op::Ln => bar[a] += w / r[a],
-        Op::Ln1p => bar[a] += w / (r[a] + 1.0),
-        Op::Sin => bar[a] += w * r[a].cos(),
-        Op::Cos => bar[a] -= w * r[a].sin(),
-        Op::Tan => bar[a] += w * (y * y + 1.0),
-        Op::Asin => bar[a] += w / (-r[a] * r[a] + 1.0).sqrt(),
-        Op::Acos => bar[a] -= w / (-r[a] * r[a] + 1.0).sqrt(),
-        Op::Atan => bar[a] += w / (r[a] * r[a] + 1.0),
-        Op::Sinh => bar[a] += w * r[a].cosh(),
-        Op::Cosh => bar[a] += w * r[a].sinh(),
+        Op::Neg | Op::ConstantSub => add(a, -w),
+        Op::Recip => add(a, -(w * (y * y))),
+        Op::Sqrt => add(a, w * 0.5 / y),
+        Op::Cbrt => add(a, w / (y * y * 3.0)),
+        Op::Exp => add(a, w * y),
+        // y + 1 has no digits where y is near −1.
+        Op::ExpM1 => add(a, w * r[a].exp()),
+        Op::Ln => add(a, w / r[a]),
+        Op::Ln1p => add(a, w / (r[a] + 1.0)),
+        Op::Sin => add(a, w * r[a].cos()),
+        Op::Cos => add(a, -(w * r[a].sin())),
+        Op::Tan => add(a, w * (y * y + 1.0)),
+        Op::Asin => add(a, w / ((1.0 - r[a]) * (1.0 + r[a])).sqrt()),
+        Op::Acos => add(a, -(w / ((1.0 - r[a]) * (1.0 + r[a])).sqrt())),
+        Op::Atan => add(a, w / (r[a] * r[a] + 1.0)),
+        Op::Sinh => add(a, w * r[a].cosh()),
+        Op::Cosh => add(a, w * r[a].sinh()),
         // 1 − y² has no digits where y is near 1.
         Op::Tanh => {
             let cosh = r[a].cosh();
-            bar[a] += w / (cosh * cosh);
+            add(a, w / (cosh * cosh));
         }
-        Op::Asinh => bar[a] += w / (r[a] * r[a] + 1.0).sqrt(),
-        Op::Acosh => bar[a] += w / (r[a] * r[a] - 1.0).sqrt(),
-        Op::Atanh => bar[a] += w / (-r[a] * r[a] + 1.0),
+        Op::Asinh => add(a, w / (r[a] * r[a] + 1.0).sqrt()),
+        Op::Acosh => add(a, w / ((r[a] - 1.0) * (r[a] + 1.0)).sqrt()),
+        Op::Atanh => add(a, w / ((1.0 - r[a]) * (1.0 + r[a]))),
         Op::Abs => {
             if r[a].is_sign_positive() {
-                bar[a] += w;
+                add(a, w);
             } else {
-                bar[a] -= w;
+                add(a, -w);
             }
         }
         Op::Add => {
-            bar[a] += w;
-            bar[b] += w;
+            add(a, w);
+            add(b, w);
         }
         Op::Sub => {
-            bar[a] += w;
-            bar[b] -= w;
+            add(a, w);
+            add(b, -w);
         }
         Op::Mul => {
-            bar[a] += w * r[b];
-            bar[b] += w * r[a];
+            add(a, w * r[b]);
+            add(b, w * r[a]);
         }
         Op::Div => {
             let quotient = w / r[b];
-            bar[a] += quotient;
-            bar[b] -= quotient * y;
+            add(a, quotient);
+            add(b, -(quotient * y));
         }
         Op::Pow => {
-            bar[a] += w * r[b] * r[a].powf(r[b] - 1.0);
+            add(a, w * r[b] * r[a].powf(r[b] - 1.0));
             // 0ᵇ = 0 for all b > 0, and ln 0 is infinite.
             if r[a] != 0.0 {
-                bar[b] += w * y * r[a].ln();
+                add(b, w * y * r[a].ln());
             }
         }
         Op::Atan2 => {
             let q = w / (r[a] * r[a] + r[b] * r[b]);
-            bar[a] += q * r[b];
-            bar[b] -= q * r[a];
+            add(a, q * r[b]);
+            add(b, -(q * r[a]));
         }
-        Op::Min | Op::Max => bar[if is_chosen_first(instruction, r) { a } else { b }] += w,
-        Op::AddConstant => bar[a] += w,
-        Op::Scale => bar[a] += w * k,
-        Op::DivConstant => bar[a] += w / k,
-        Op::ConstantDiv => bar[a] -= w * y / r[a],
+        Op::Min | Op::Max => add(if is_chosen_first(instruction, r) { a } else { b }, w),
+        Op::AddConstant => add(a, w),
+        Op::Scale => add(a, w * k),
+        Op::DivConstant => add(a, w / k),
+        Op::ConstantDiv => add(a, -(w * y / r[a])),
         Op::PowI => {
             let n = integer(k);
             if n != 0 {
-                bar[a] += w * r[a].powi(n - 1) * k;
+                add(a, w * r[a].powi(n - 1) * k);
             }
         }
         Op::PowF => {
             if k != 0.0 {
-                bar[a] += w * r[a].powf(k - 1.0) * k;
+                add(a, w * r[a].powf(k - 1.0) * k);
             }
         }
-        Op::Select => bar[if is_chosen_first(instruction, r) { b } else { c }] += w,
+        Op::Select => add(if is_chosen_first(instruction, r) { b } else { c }, w),
         Op::MulAdd => {
-            bar[a] += w * r[b];
-            bar[b] += w * r[a];
-            bar[c] += w;
+            add(a, w * r[b]);
+            add(b, w * r[a]);
+            add(c, w);
         }
         Op::ScaleAdd => {
-            bar[a] += w * k;
-            bar[b] += w;
+            add(a, w * k);
+            add(b, w);
         }
     }
 }
@@ -225,10 +228,13 @@ impl Tape {
         bar.clear();
         bar.resize(r.len(), 0.0);
         weigh(bar);
-        for (k, instruction) in self.code().iter().enumerate().rev() {
-            let w = bar[n + k];
+        // Cells, because the weight of the result is read beside those that are written.
+        let bar = Cell::from_mut(bar.as_mut_slice()).as_slice_of_cells();
+        let results = r[n..].iter().zip(&bar[n..]);
+        for (instruction, (&y, w)) in self.code().iter().zip(results).rev() {
+            let w = w.get();
             if w != 0.0 {
-                pull_back(instruction, r, r[n + k], w, bar);
+                pull_back(instruction, r, y, w, bar);
             }
         }
     }

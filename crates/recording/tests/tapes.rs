@@ -24,7 +24,7 @@ fn by_dual_numbers(tape: &Tape, x: &[f64]) -> (f64, Vec<f64>, Vec<f64>) {
     (value, df, hf)
 }
 
-/// The same by sweeps.
+/// The derivatives of the first output by sweeps.
 fn by_sweeps(tape: &Tape, x: &[f64]) -> (f64, Vec<f64>, Vec<f64>) {
     let n = x.len();
     let (mut df, mut hf) = (vec![0.0; n], vec![0.0; n * n]);
@@ -84,6 +84,34 @@ fn each_operation_has_the_derivatives_of_dual_numbers() {
         }
     }
     assert!(compared > 700, "{compared} comparisons");
+}
+
+#[test]
+fn slopes_keep_their_digits_at_the_edges() {
+    let slopes = |op: Op, x: f64| {
+        let tape = Tape::from_parts(1, [(op.code(), [0; 3], 0.0)], vec![1]).unwrap();
+        let (_, df, _) = by_sweeps(&tape, &[x]);
+        let mut slope = [f64::NAN];
+        tape.gradient(&[x], &mut slope);
+        [df[0], slope[0]]
+    };
+    let near = 1.0 - 2.0_f64.powi(-40);
+    for (op, x, exact) in [
+        (Op::ExpM1, -40.0, (-40.0_f64).exp()),
+        (Op::Tanh, 30.0, 4.0 * (-60.0_f64).exp()),
+        (Op::Tanh, 800.0, 0.0),
+        (Op::Asin, near, 2.0_f64.powf(19.5)),
+        (Op::Acos, near, -(2.0_f64.powf(19.5))),
+        (Op::Atanh, near, 2.0_f64.powi(39)),
+        (Op::Acosh, 2.0 - near, 2.0_f64.powf(19.5)),
+    ] {
+        for slope in slopes(op, x) {
+            assert!(
+                (slope - exact).abs() <= 1e-12 * exact.abs(),
+                "{op:?}: {slope:e} and {exact:e}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -150,7 +178,7 @@ fn a_simplified_tape_is_short() {
     assert_eq!(text(|x| x[0] + x[1] * x[0]), "r2 = mul_add(r0, r1, r0); return r2");
     let cube = "r2 = mul(r0, r0); r3 = mul(r0, r2); return r3";
     assert_eq!(text(|x| DualNum::powi(&x[0], 3)), cube);
-    // What no output needs, and what depends on constants alone.
+    // An operation that no output needs, and one on a constant.
     assert_eq!(text(|x| (x[0].exp(), x[1]).1), "return r1");
     assert_eq!(
         text(|_| Recorded::from(2.0).sqrt()),
@@ -193,7 +221,7 @@ fn parts(inputs: u32) -> impl Strategy<Value = Vec<(u32, [u32; 3], f64)>> {
     })
 }
 
-/// The same number, where the signs of zero and the kinds of NaN do not count.
+/// Returns whether two numbers are the same, where the signs of zero and the kinds of NaN do not count.
 fn is_same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }

@@ -563,7 +563,9 @@ mod tests {
         let start = (&x[..], &u[..], 0.5);
         paths.curve(Path::Chart, start, &mut y, [&mut v, &mut a]).unwrap();
         assert!(a[0].abs() > 1e-3, "{a:?}");
-        let velocity = asked(&mut || drop(model.along(ENERGY, 0.0, &y, [&v, &v])));
+        let velocity = asked(&mut || {
+            model.along(ENERGY, 0.0, &y, [&v, &v]);
+        });
         let mut law = [[0.0; 2]];
         let both = asked(&mut || {
             model.along_curve(0.0, (&paths, Path::Chart), start, &mut law).unwrap();

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! with the same size, the same random numbers and the same branch of the method. It has some ten digits, and serves each kind
-//! of system with each method. Where the charts of a curved space are
-//! known by their values alone ([`ByCharts`](metriplectic_equations::ByCharts)), it has eight or nine. `ε` is a fraction of the sizes of what is displaced. Where the two quotients differ, it is smaller; where the
-//! other entries hardly respond, because an entry is small beside the distance over which the step bends, it is larger.
+//! of system with each method. Where the charts of a curved space are known by their values alone
+//! ([`ByCharts`](metriplectic_equations::ByCharts)), it has eight or nine. `ε` is a fraction of the sizes of what is displaced. Where the two
+//! quotients differ, it is smaller; where the other entries hardly respond, because an entry is small beside the distance over which the
+//! step bends, it is larger.
 //!
 //! The values of the laws at the start of a step beside another one are those on the way there: so the first law of tangents does not
 //! drift.

@@ -1,10 +1,9 @@
 //! Errors of a sweep. A row that fails is no error here: it is a row.
 
-use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use crate::table::Table;
+use crate::listed::listed;
 
 /// A plan of rows that makes no sense.
 #[derive(Debug, thiserror::Error)]
@@ -164,57 +163,6 @@ pub enum JournalError {
     None,
 }
 
-/// A sweep that did not finish. The rows so far are in it, and in the journal.
-#[derive(thiserror::Error)]
-#[non_exhaustive]
-pub enum SweepError {
-    /// The plan makes no sense.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The journal cannot be used.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// The journal could not be written, because the disk is full for example.
-    #[error("{source}; {} rows are kept in this error", table.len())]
-    Write {
-        /// The error of the journal.
-        source: JournalError,
-        /// The rows so far.
-        table: Box<Table>,
-    },
-    /// Ctrl-C or the signal of a scheduler has ended the sweep, after the rows in hand.
-    #[error("the sweep was interrupted after {} rows{}", table.len(), advice(*journal))]
-    Interrupted {
-        /// The rows so far.
-        table: Box<Table>,
-        /// Whether there is a journal from which it goes on.
-        journal: bool,
-    },
-}
-
-impl SweepError {
-    /// The rows that were finished, if the sweep had begun.
-    #[must_use]
-    pub fn table(&self) -> Option<&Table> {
-        match self {
-            Self::Write { table, .. } | Self::Interrupted { table, .. } => Some(table),
-            Self::Plan(_) | Self::Journal(_) => None,
-        }
-    }
-}
-
-/// The remedy after an interruption.
-const fn advice(journal: bool) -> &'static str {
-    if journal { "; run it again, and it goes on" } else { "" }
-}
-
-/// Prints the sentence, which is what a `main` that returns the error shows.
-impl fmt::Debug for SweepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
-
 /// A question that a table cannot answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -254,7 +202,7 @@ pub enum TableError {
     #[error("no row of the table has finished")]
     NoRows,
     /// Rows are missing.
-    #[error("{} rows are missing: {}", rows.len(), crate::table::listed(rows))]
+    #[error("{} rows are missing: {}", rows.len(), listed(rows))]
     Missing {
         /// Their numbers.
         rows: Vec<usize>,

@@ -12,7 +12,7 @@ use metriplectic_integrators::{Error, StateSpace};
 
 use crate::bar::Bar;
 use crate::entry::{Done, Entry, Failed, Outcome, RowStatus, ending};
-use crate::error::{JournalError, SweepError};
+use crate::error::JournalError;
 use crate::figures::{figures, kind};
 use crate::interrupt::{self, Listening};
 use crate::journal::{Header, Journal, combined, encode};
@@ -20,6 +20,7 @@ use crate::record::{Record, Recorded};
 use crate::row::Row;
 use crate::running::{InFlight, Running};
 use crate::runs::Runs;
+use crate::sweep_error::SweepError;
 use crate::table::Table;
 
 /// The execution of a sweep.

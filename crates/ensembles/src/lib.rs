@@ -63,23 +63,27 @@ mod fingerprint;
 mod interrupt;
 mod journal;
 #[cfg(feature = "serde")]
+mod listed;
 mod long;
 mod plan;
 mod record;
+mod replaced;
 mod row;
 mod rows_file;
 mod running;
 mod runs;
 mod shard;
+mod sweep_error;
 mod table;
 
 pub use draw::Draw;
 pub use entry::RowStatus;
-pub use error::{JournalError, PlanError, SweepError, TableError};
+pub use error::{JournalError, PlanError, TableError};
 pub use estimate::{Estimate, FluctuationTheorem};
 pub use plan::{Sweep, geomspace, linspace};
 pub use record::{Crossing, Record, Recorded};
 pub use row::Row;
 pub use runs::Runs;
 pub use shard::{Shard, ShardError};
+pub use sweep_error::SweepError;
 pub use table::{Series, Table, TableRow};

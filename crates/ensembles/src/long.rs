@@ -19,8 +19,8 @@ use crate::error::JournalError;
 use crate::fingerprint::of_line;
 use crate::interrupt;
 use crate::record::{Crossing, Record};
+use crate::replaced::replaced;
 use crate::row::Row;
-use crate::table::replaced;
 
 /// Where a row keeps its checkpoint.
 #[derive(Debug)]

@@ -5,16 +5,12 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use metriplectic_integrators::{Error, Observables};
-
 use crate::draw::{Draw, mixed, permuted, within};
 use crate::error::PlanError;
 use crate::figures::reserved;
 use crate::fingerprint::Fingerprint;
-use crate::record::Recorded;
 use crate::row::Row;
 use crate::rows_file;
-use crate::runs::Runs;
 
 /// A plan of rows: products of grids, of samples and of listed rows. [`run`](Self::run) says what a row does.
 ///
@@ -215,15 +211,6 @@ impl Sweep {
     fn times(mut self, factor: Factor) -> Self {
         self.factors.push(factor);
         self
-    }
-
-    /// Says what a row does: a closure that builds a system from the parameters and returns its trajectory.
-    pub fn run<'a, T, F>(self, run: F) -> Runs<'a, T::Space, F>
-    where
-        T: Recorded,
-        F: Fn(&Row) -> Result<T, Error> + Sync,
-    {
-        Runs::new(self, run, Observables::new())
     }
 
     /// The number of rows.

@@ -1,18 +1,19 @@
 //! The rows of a sweep with what they do and what is observed: everything but their execution.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use metriplectic_integrators::{Error, Observables, StateSpace};
 
-use crate::error::{PlanError, SweepError};
+use crate::error::PlanError;
 use crate::execution::Execution;
 use crate::journal::Header;
 use crate::plan::Sweep;
 use crate::record::{Record, Recorded};
 use crate::row::Row;
-use crate::shard::Shard;
+use crate::shard::{Shard, of_shard};
+use crate::sweep_error::SweepError;
 use crate::table::Table;
 
 /// A number of a whole run.
@@ -32,6 +33,17 @@ pub struct Runs<'a, M: StateSpace, F> {
     pub(crate) retries: bool,
     #[cfg(feature = "serde")]
     pub(crate) checkpoints: std::time::Duration,
+}
+
+impl Sweep {
+    /// Says what a row does: a closure that builds a system from the parameters and returns its trajectory.
+    pub fn run<'a, T, F>(self, run: F) -> Runs<'a, T::Space, F>
+    where
+        T: Recorded,
+        F: Fn(&Row) -> Result<T, Error> + Sync,
+    {
+        Runs::new(self, run, Observables::new())
+    }
 }
 
 impl<'a, M: StateSpace, F> Runs<'a, M, F> {
@@ -207,13 +219,5 @@ impl<M: StateSpace, F> fmt::Debug for Runs<'_, M, F> {
             .field("journal", journal)
             .field("shard", shard)
             .finish_non_exhaustive()
-    }
-}
-
-/// The journal of a shard: `relax.3.journal` beside `relax.journal`.
-pub(crate) fn of_shard(path: &Path, index: usize) -> PathBuf {
-    match path.extension() {
-        Some(ending) => path.with_extension(format!("{index}.{}", ending.to_string_lossy())),
-        None => path.with_extension(index.to_string()),
     }
 }

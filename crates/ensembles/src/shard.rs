@@ -1,6 +1,7 @@
 //! Which of several processes this one is.
 
 use std::env;
+use std::path::{Path, PathBuf};
 
 /// One of `count` processes that share the rows of a sweep: it runs the rows `r` with `r mod count = index`.
 ///
@@ -265,5 +266,13 @@ fn rank(variable: Variables<'_>) -> Result<Option<Shard>, ShardError> {
     match (set(variable, "SLURM_PROCID")?, set(variable, "SLURM_STEP_NUM_TASKS")?) {
         (Some(index), Some(count)) => Shard::new(index, count).map(Some),
         _ => Ok(None),
+    }
+}
+
+/// The journal of a shard: `relax.3.journal` beside `relax.journal`.
+pub(crate) fn of_shard(path: &Path, index: usize) -> PathBuf {
+    match path.extension() {
+        Some(ending) => path.with_extension(format!("{index}.{}", ending.to_string_lossy())),
+        None => path.with_extension(index.to_string()),
     }
 }

@@ -13,10 +13,9 @@ use crate::entry::{Entry, RowStatus};
 use crate::error::{JournalError, TableError};
 use crate::figures::FIGURES;
 use crate::journal::{Header, merged};
-use crate::runs::of_shard;
+use crate::shard::of_shard;
 
 #[cfg(feature = "serde")]
-pub(crate) use files::replaced;
 pub use time::Series;
 
 /// The rows of a sweep. Its numbers do not depend on threads, shards, or how often the sweep was put down.
@@ -271,13 +270,4 @@ impl<'a> TableRow<'a> {
         let (k, n) = (at(&header.observables)?, done.times.len());
         done.series.get(((k + 1) * n).checked_sub(1)?).copied()
     }
-}
-
-/// The first few numbers of a list, and how many follow.
-pub(crate) fn listed(rows: &[usize]) -> String {
-    const SHOWN: usize = 10;
-    let shown: Vec<String> = rows.iter().take(SHOWN).map(ToString::to_string).collect();
-    let more = rows.len().saturating_sub(SHOWN);
-    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{rest}", shown.join(", "))
 }

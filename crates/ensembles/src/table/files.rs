@@ -1,13 +1,13 @@
 //! Files of tables: text, and arrays of `numpy`.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::Path;
 
 use metriplectic_integrators::run::observables::{npy_header, quoted};
 
 use super::Table;
 use super::time::Series;
+use crate::replaced::replaced;
 
 impl Table {
     /// Writes comma-separated values (RFC 4180). A number read back is the number written, to the last bit; a cell
@@ -100,25 +100,4 @@ fn write_npy(
         file.write_all(&npy_header(names.iter().map(String::as_str), rows.len()))?;
         rows.flatten().try_for_each(|x| file.write_all(&x.to_le_bytes()))
     })
-}
-
-/// Writes a file beside the one of this path, and then puts it in its place.
-pub(crate) fn replaced(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part: PathBuf = path.with_file_name(name);
-    let written = File::create(&part).and_then(|file| {
-        let mut file = BufWriter::new(file);
-        write(&mut file)?;
-        file.flush()?;
-        file.get_ref().sync_data()
-    });
-    let placed = written.and_then(|()| fs::rename(&part, path));
-    if placed.is_err() {
-        let _ = fs::remove_file(&part);
-    }
-    placed
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use super::{Table, TableRow, listed};
+use super::{Table, TableRow};
+use crate::listed::listed;
 
 /// The summary in a few lines: how many rows are done, what failed, and the worst figures.
 impl fmt::Display for Table {

@@ -22,6 +22,7 @@ mod force;
 mod invariants;
 mod metric;
 mod motion;
+mod numbers;
 mod reached;
 pub(crate) mod sampling;
 mod sums;

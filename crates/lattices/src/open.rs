@@ -30,7 +30,7 @@ use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::{Onsager, SiteState};
 use crate::points::{Points, Sites};
 use crate::vector::SiteVector;
-use in_time::Field;
+use in_time::{AtTime, Field};
 pub use noise::NoisySurroundings;
 use parts::{Part, PartKind};
 
@@ -222,5 +222,13 @@ impl<P: Model> OpenLattice<P> {
     /// The entropy of the lattice at a state, without that of the baths.
     pub fn entropy_at(&self, state: &StateOf<P>) -> f64 {
         self.lattice.totals(&state.x)[1].sum.value()
+    }
+}
+
+impl<P: Model> OpenLattice<P> {
+    /// The lattice with the energy that it has at a time.
+    pub(crate) fn at(&self, time: f64) -> Lattice<AtTime<'_, P>> {
+        let parts = AtTime { parts: &self.lattice.parts, fields: &self.fields, time };
+        self.lattice.with_parts(parts)
     }
 }

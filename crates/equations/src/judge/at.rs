@@ -1,5 +1,6 @@
 //! A state at which laws are checked.
 
+pub(super) use super::numbers::{all_finite, dot, max_abs};
 use super::table::{Row, Table, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, MetricError, Model, ModelError, Part};
 
@@ -172,19 +173,4 @@ impl Place<'_> {
     pub(super) fn differentials(&self) -> Covectors<'_> {
         Covectors { energy: &self.energy.df, entropy: &self.entropy.df }
     }
-}
-
-/// The sum `⟨α, v⟩`.
-pub(super) fn dot(alpha: &[f64], v: &[f64]) -> f64 {
-    alpha.iter().zip(v).map(|(a, v)| a * v).sum()
-}
-
-/// The largest absolute value, and NaN if one is NaN.
-pub(super) fn max_abs(numbers: &[f64]) -> f64 {
-    numbers.iter().map(|number| number.abs()).fold(0.0, super::balance::worse)
-}
-
-/// Returns whether all numbers are finite.
-pub(super) fn all_finite(numbers: &[f64]) -> bool {
-    numbers.iter().all(|number| number.is_finite())
 }

@@ -3,6 +3,7 @@
 //! The entries of a state may have different units, so the norm of a vector has no meaning. A sum
 //! `Σ_j A_ij w_j` is compared with `Σ_j |A_ij||w_j|`, row by row, in which every term has one unit.
 
+pub(super) use super::numbers::worse;
 use super::table::{Row, Table, pairs, zeros};
 use smallvec::SmallVec;
 
@@ -83,11 +84,6 @@ impl FromIterator<f64> for Balance {
         balance.extend(terms);
         balance
     }
-}
-
-/// Returns the larger of two sizes, where NaN is the largest.
-pub(crate) fn worse(old: f64, new: f64) -> f64 {
-    if new > old || new.is_nan() { new } else { old }
 }
 
 /// The largest relative size of a row of `A w`, in chart coordinates of the sizes `units`.

@@ -53,12 +53,12 @@ impl Table {
 
     /// The product with a vector.
     pub(super) fn times(&self, v: &[f64]) -> Row {
-        self.entries.chunks_exact(self.n).map(|row| super::at::dot(row, v)).collect()
+        self.entries.chunks_exact(self.n).map(|row| super::numbers::dot(row, v)).collect()
     }
 
     /// The largest absolute value of an entry, and NaN if one is NaN.
     pub(super) fn max_abs(&self) -> f64 {
-        super::at::max_abs(&self.entries)
+        super::numbers::max_abs(&self.entries)
     }
 }
 

@@ -7,7 +7,7 @@ use metriplectic_integrators::open::{Exchanged, Ledger, OpenFlow, compare_with_v
 use metriplectic_integrators::{Flow as _, FlowError, NoImplicitSteps};
 use metriplectic_manifolds::Manifold;
 
-use super::in_time::AtTime;
+use super::in_time::{self, AtTime};
 use super::parts::Exchanged as OfParts;
 use super::{OpenLattice, StateOf};
 use crate::dense::Dense;
@@ -50,13 +50,17 @@ impl<P: Model> OpenFlow for OpenLattice<P> {
     }
 
     fn power(&self, t: f64, x: &Points<P::Manifold>) -> f64 {
-        self.sum_in_time(x, |field, site, x| field(Real::new(t, 1.0, 0.0, 0.0), site, x).eps1)
+        in_time::sum::<P>(&self.fields, x, |field, site, x| {
+            field(Real::new(t, 1.0, 0.0, 0.0), site, x).eps1
+        })
     }
 
     /// The work of the energies that depend on time alone, so that it has the digits of these.
     fn frozen_work(&self, [t, end]: [f64; 2], x: &Points<P::Manifold>) -> f64 {
         let [t, end] = [t, end].map(Real::from);
-        self.sum_in_time(x, |field, site, x| field(end, site, x).re - field(t, site, x).re)
+        in_time::sum::<P>(&self.fields, x, |field, site, x| {
+            field(end, site, x).re - field(t, site, x).re
+        })
     }
 
     fn velocity_of(

@@ -2,10 +2,8 @@
 
 use metriplectic_fields::{Jet1, Real, ScalarField, Space};
 
-use super::OpenLattice;
 use crate::double::Double;
 use crate::gather::Gathers;
-use crate::lattice::Lattice;
 use crate::model::{Model, PairManifold, PairOf, PointOf, VectorOf};
 use crate::onsager::Onsager;
 use crate::parallel;
@@ -18,9 +16,9 @@ pub(super) type Field<P> = dyn Fn(Real, usize, &RealPointOf<P>) -> Real + Send +
 /// The parts of a lattice, with the energy that it has at a time.
 #[expect(missing_debug_implementations, reason = "closures have no `Debug`")]
 pub struct AtTime<'a, P: Model> {
-    parts: &'a P,
-    fields: &'a [Box<Field<P>>],
-    time: f64,
+    pub(super) parts: &'a P,
+    pub(super) fields: &'a [Box<Field<P>>],
+    pub(super) time: f64,
 }
 
 impl<P: Model> AtTime<'_, P> {
@@ -122,34 +120,26 @@ impl<P: Model> Model for AtTime<'_, P> {
     }
 }
 
-impl<P: Model> OpenLattice<P> {
-    /// The lattice with the energy that it has at a time.
-    pub(crate) fn at(&self, time: f64) -> Lattice<AtTime<'_, P>> {
-        let parts = AtTime { parts: &self.lattice.parts, fields: &self.fields, time };
-        self.lattice.with_parts(parts)
+/// Sums a number of each site over all energies that depend on time, in double digits and in a fixed order.
+pub(super) fn sum<P: Model>(
+    fields: &[Box<Field<P>>],
+    x: &[PointOf<P>],
+    number: impl Fn(&Field<P>, usize, &RealPointOf<P>) -> f64 + Sync,
+) -> f64 {
+    if fields.is_empty() {
+        return 0.0;
     }
-
-    /// Sums a number of each site over all energies that depend on time, in double digits and in a fixed order.
-    pub(super) fn sum_in_time(
-        &self,
-        x: &[PointOf<P>],
-        number: impl Fn(&Field<P>, usize, &RealPointOf<P>) -> f64 + Sync,
-    ) -> f64 {
-        if self.fields.is_empty() {
-            return 0.0;
+    let sums = parallel::map(x.len(), |sites| {
+        let mut sum = Double::default();
+        for site in sites {
+            let x = P::Manifold::constant(&x[site]);
+            fields.iter().for_each(|field| sum.add(number(&**field, site, &x)));
         }
-        let sums = parallel::map(x.len(), |sites| {
-            let mut sum = Double::default();
-            for site in sites {
-                let x = P::Manifold::constant(&x[site]);
-                self.fields.iter().for_each(|field| sum.add(number(&**field, site, &x)));
-            }
-            sum
-        });
-        let sum = parallel::tree(sums, |mut a, b| {
-            a.merge(b);
-            a
-        });
-        sum.unwrap_or_default().value()
-    }
+        sum
+    });
+    let sum = parallel::tree(sums, |mut a, b| {
+        a.merge(b);
+        a
+    });
+    sum.unwrap_or_default().value()
 }

@@ -230,11 +230,12 @@ fn is_same(a: f64, b: f64) -> bool {
 fn agree(parts: Vec<(u32, [u32; 3], f64)>, x: &[f64]) -> Result<(), TestCaseError> {
     let n = x.len();
     let registers: Vec<u32> = (0..).take(n + parts.len()).collect();
-    let tape = Tape::from_parts(n, parts, registers[registers.len() - 1..].to_vec()).unwrap();
+    let tape =
+        Tape::from_parts(n, parts, registers[registers.len() - 1..].to_vec()).expect("a tape");
     // A condition may rest on a number that rounds differently at a dual number, so none is near zero.
     let mut numbers = vec![0.0; registers.len()];
     let (inputs, code, _) = tape.to_parts();
-    Tape::from_parts(inputs, code, registers).unwrap().evaluate(x, &mut numbers);
+    Tape::from_parts(inputs, code, registers).expect("a tape").evaluate(x, &mut numbers);
     let size = numbers.iter().fold(1.0, |most: f64, y| most.max(y.abs()));
     let least = numbers.iter().fold(1.0, |least: f64, y| least.min(y.abs()));
     if size > 1e3 || least < 1e-3 {

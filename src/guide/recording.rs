@@ -50,12 +50,12 @@
 //!
 //! | method | closure | tape |
 //! |---|--:|--:|
-//! | `DormandPrince5` | 295,380 | 133,705 |
-//! | `DormandPrince8` | 453,490 | 192,139 |
-//! | `WeylMidpoint` | 144,962 | 87,810 |
-//! | `Gauss::<3>` | 1,956,857 | 1,212,015 |
+//! | `DormandPrince5` | 295,379 | 110,568 |
+//! | `DormandPrince8` | 453,489 | 168,874 |
+//! | `WeylMidpoint` | 144,961 | 94,698 |
+//! | `Gauss::<3>` | 1,956,856 | 1,211,383 |
 //!
-//! A recorded field takes the faster one of closure and tape by itself. The tape needs the memory of one number for each
+//! A recorded field takes the faster one of closure and tape by itself. A sweep needs room for a few numbers for each
 //! operation, and each thread keeps it from one evaluation to the next.
 //!
 //! # What can be recorded

@@ -30,10 +30,10 @@ pub trait PointEntries: Manifold {
     /// the entries.
     #[inline]
     fn pull_back(x: &Self::Point<f64>, w: &[f64]) -> Vector<Self> {
-        let mut df = Vector::<Self>::zero();
         if Self::IS_TRANSLATION {
             return Vector::<Self>::from_index(|i| w[i]);
         }
+        let mut df = Vector::<Self>::zero();
         let (n, seeded) = (<Self::Dim as Dimension>::LEN, Self::seeds(x));
         for i in (0..n).step_by(2) {
             let mut weights = w.iter();

@@ -8,16 +8,17 @@ use crate::{PointEntries, Tape, TapeField};
 
 /// The fewest variables with which the gradient by a sweep back takes fewer instructions than by dual numbers.
 ///
-/// Instructions for a ring of sites with three variables each and one `exp` a site, by closure and by tape (callgrind, x86-64, release): 576 and 2432 with 6 variables, 4078 and 3669 with 9,
-/// 5995 and 4820 with 12, 28,714 and 9448 with 24, 120,747 and 22,034 with 48.
+/// Instructions for a ring of sites with three variables each and one `exp` a site, by closure and by tape (callgrind,
+/// x86-64, release): 576 and 2124 with 6 variables, 4078 and 3195 with 9, 5995 and 4197 with 12, 28,714 and 8167 with 24,
+/// 120,747 and 19,607 with 48.
 ///
 /// A factor of four fails `tests/recorded_fields.rs::each_derivative_comes_from_the_faster_one`.
 const GRADIENT_FROM: usize = 9;
 
 /// The fewest variables with which the Hessian by sweeps takes fewer instructions than by dual numbers.
 ///
-/// Instructions for the same ring: 12,045 and 12,606 with 6 variables, 38,140 and 28,207 with 9, 81,540 and 37,350 with 12, 715,868 and 106,055 with 24,
-/// 5,931,070 and 412,685 with 48.
+/// Instructions for the same ring: 12,045 and 14,452 with 6 variables, 38,140 and 25,756 with 9, 81,540 and 35,991 with 12,
+/// 715,868 and 86,144 with 24, 5,931,070 and 275,868 with 48.
 ///
 /// A factor of four fails `tests/recorded_fields.rs::each_derivative_comes_from_the_faster_one`.
 const HESSIAN_FROM: usize = 7;

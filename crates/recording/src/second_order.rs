@@ -38,10 +38,13 @@ enum Kind {
 impl Local {
     /// Forms the derivatives of an instruction with the result `y`.
     pub(crate) fn of(instruction: &Instruction, r: &[f64], y: f64) -> Self {
-        let &Instruction { op, operands, constant: k } = instruction;
+        let (op, k) = (instruction.op, instruction.constant);
+        // The first operand stands for those that are not read.
+        let mut operands = [instruction.operands[0]; 3];
+        operands[..op.operands()].copy_from_slice(instruction.reads());
         let [a, b] = [r[operands[0] as usize], r[operands[1] as usize]];
         let flat = Self { operands, ..Self::default() };
-        let same = |register: u32| Self { kind: Kind::Same, operands: [register, 0, 0], ..flat };
+        let same = |register: u32| Self { kind: Kind::Same, operands: [register; 3], ..flat };
         let line = |slope: f64| Self { kind: Kind::Line, slopes: [slope, 0.0], ..flat };
         let plane = |slopes: [f64; 2]| Self { kind: Kind::Plane, slopes, ..flat };
         let curve = |slope: f64, bend: f64| Self {
@@ -152,6 +155,26 @@ impl Local {
         }
     }
 
+    /// Returns whether one of the operands that have a slope is marked.
+    #[inline(always)]
+    fn is_touched(&self, marked: &[bool]) -> bool {
+        let [a, b, c] = self.operands.map(|register| marked[register as usize]);
+        self.kind != Kind::Flat && (a | b | c)
+    }
+
+    /// Returns whether a second derivative does not vanish.
+    #[inline(always)]
+    fn is_bent(&self) -> bool {
+        matches!(self.kind, Kind::Curve | Kind::Surface | Kind::ProductAndSum)
+    }
+
+    /// Returns whether its slopes change where one of the marked registers does.
+    #[inline(always)]
+    fn bends_with(&self, moved: &[bool]) -> bool {
+        let [a, b, _] = self.operands.map(|register| moved[register as usize]);
+        self.is_bent() && (a | b)
+    }
+
     /// Adds the size of what the weight `w` contributes to each operand.
     fn add_sizes(&self, w: f64, sizes: &mut [f64]) {
         let [a, b, c] = self.operands.map(|register| register as usize);
@@ -247,6 +270,45 @@ pub(crate) struct SecondOrder<'a> {
     locals: &'a [Local],
 }
 
+/// The derivatives of all registers and of their weights along `L` directions, and the marks of those that may not be
+/// zero.
+struct Lanes<'a, const L: usize> {
+    t: &'a mut [[f64; L]],
+    bar: &'a mut [[f64; L]],
+    moved: &'a mut [bool],
+    met: &'a mut [bool],
+    needed: &'a mut [bool],
+}
+
+/// Lends lanes of zeros, and a list of pairs of numbers: the room for numbers one by one is in use.
+fn with_lanes<const L: usize>(registers: usize, f: impl FnOnce(Lanes<'_, L>, &mut Vec<[f64; 2]>)) {
+    room::with(|lanes: &mut room::Room<[f64; L]>| {
+        room::with(|marks: &mut room::Room<bool>| {
+            room::with(|pairs: &mut room::Room<[f64; 2]>| {
+                for list in [&mut lanes.values, &mut lanes.weights] {
+                    list.clear();
+                    list.resize(registers, [0.0; L]);
+                }
+                marks.values.clear();
+                marks.values.resize(3 * registers, false);
+                let (t, bar) = (&mut lanes.values, &mut lanes.weights);
+                let (moved, rest) = marks.values.split_at_mut(registers);
+                let (met, needed) = rest.split_at_mut(registers);
+                f(Lanes { t, bar, moved, met, needed }, &mut pairs.values);
+            });
+        });
+    });
+}
+
+/// Sets what is marked to zero, and takes the marks away.
+fn clear<const L: usize>(lanes: &mut [[f64; L]], marked: &mut [bool]) {
+    for (lanes, is_marked) in lanes.iter_mut().zip(marked) {
+        if *is_marked {
+            (*lanes, *is_marked) = ([0.0; L], false);
+        }
+    }
+}
+
 impl Tape {
     /// Forms value, gradient and the derivatives of all instructions at the inputs that `fill` writes, and hands them to `f`.
     pub(crate) fn second_order<R>(
@@ -301,47 +363,71 @@ impl SecondOrder<'_> {
         }
     }
 
+    /// Goes along `L` directions at a time. A function whose terms have few variables each moves a part of its registers
+    /// along a few directions; the others are left out.
     fn along_lanes<const L: usize>(
         &self,
         count: usize,
         seed: impl Fn(usize, &mut dyn FnMut(usize, f64)),
         mut column: impl FnMut(usize, &[f64]),
     ) {
-        let (n, registers) = (self.tape.inputs(), self.values.len());
-        room::with(|lanes: &mut room::Room<[f64; L]>| {
-            // The room for numbers one by one is in use: this is that for pairs.
-            room::with(|columns: &mut room::Room<[f64; 2]>| {
-                let (t, bar) = (&mut lanes.values, &mut lanes.weights);
-                columns.values.resize(n.div_ceil(2), [0.0; 2]);
-                t.resize(registers, [0.0; L]);
-                for first in (0..count).step_by(L) {
-                    t[..n].fill([0.0; L]);
-                    let group = first..count.min(first + L);
-                    for j in group.clone() {
-                        seed(j, &mut |input, entry| t[input][j - first] = entry);
-                    }
-                    for (k, local) in self.locals.iter().enumerate() {
+        let n = self.tape.inputs();
+        with_lanes::<L>(self.values.len(), |Lanes { t, bar, moved, met, needed }, numbers| {
+            self.mark_needed(needed);
+            numbers.resize(n.div_ceil(2), [0.0; 2]);
+            let numbers = &mut numbers.as_flattened_mut()[..n];
+            for first in (0..count).step_by(L) {
+                let group = first..count.min(first + L);
+                for j in group.clone() {
+                    seed(j, &mut |input, entry| {
+                        t[input][j - first] = entry;
+                        moved[input] = true;
+                    });
+                }
+                for (k, local) in self.locals.iter().enumerate() {
+                    if needed[n + k] && local.is_touched(moved) {
+                        moved[n + k] = true;
                         t[n + k] = local.tangent(t);
                     }
-                    bar.clear();
-                    bar.resize(registers, [0.0; L]);
-                    for (k, local) in self.locals.iter().enumerate().rev() {
-                        let (w, dw) = (self.weights[n + k], bar[n + k]);
-                        // As in a sweep back: what nobody reads contributes nothing.
-                        if w != 0.0 || dw.iter().any(|dw| *dw != 0.0) {
+                }
+                for (k, local) in self.locals.iter().enumerate().rev() {
+                    let w = self.weights[n + k];
+                    // As in a sweep back: what nobody reads contributes nothing.
+                    let bends = w != 0.0 && local.bends_with(moved);
+                    if bends || met[n + k] {
+                        let dw = bar[n + k];
+                        if bends || dw.iter().any(|dw| *dw != 0.0) {
                             local.pull_back(w, &dw, t, bar);
+                            local
+                                .operands
+                                .iter()
+                                .for_each(|&register| met[register as usize] = true);
                         }
-                    }
-                    for j in group {
-                        let numbers = &mut columns.values.as_flattened_mut()[..n];
-                        for (number, lanes) in numbers.iter_mut().zip(&bar[..n]) {
-                            *number = lanes[j - first];
-                        }
-                        column(j, numbers);
                     }
                 }
-            });
+                for j in group {
+                    for (number, lanes) in numbers.iter_mut().zip(bar.iter()) {
+                        *number = lanes[j - first];
+                    }
+                    column(j, numbers);
+                }
+                clear(t, moved);
+                clear(bar, met);
+            }
         });
+    }
+
+    /// Marks the registers whose derivatives change the slopes of an instruction. Those of a sum that only the output
+    /// reads do not.
+    fn mark_needed(&self, needed: &mut [bool]) {
+        let n = self.tape.inputs();
+        for (k, local) in self.locals.iter().enumerate().rev() {
+            let [a, b, c] = local.operands.map(|register| register as usize);
+            let is_needed = needed[n + k];
+            needed[c] |= is_needed;
+            needed[a] |= is_needed | local.is_bent();
+            needed[b] |= is_needed | local.is_bent();
+        }
     }
 
     /// The largest number on the tape, and the largest sum of the sizes of the terms that make a component of the

@@ -6,8 +6,26 @@ use crate::sweep::{evaluate, integer};
 use crate::tape::Instruction;
 use crate::{Op, Tape};
 
-/// The docstring of [`Tape::simplified`] says what it does.
-pub(crate) fn simplified(tape: &Tape) -> Tape {
+impl Tape {
+    /// Simplifies the tape, in one pass and with the same bits at `f64`.
+    ///
+    /// - Operations on constants are done now, and equal instructions are done once.
+    /// - A constant operand becomes the constant of its instruction; a quotient by a power of two becomes a product.
+    /// - `x + 0`, `x·1`, `x/1`, `x¹` and `−(−x)` become `x`, and `x⁰` becomes 1. The only bit that changes is the sign of
+    ///   `−0 + 0`. `x·0` stays, because it is not 0 where `x` is infinite or NaN.
+    /// - A product that only one sum reads becomes a part of that sum ([`Op::MulAdd`], [`Op::ScaleAdd`]), which rounds
+    ///   as often.
+    /// - What no output needs is left out.
+    ///
+    /// Derivatives are the same to round-off.
+    #[must_use]
+    pub fn simplified(&self) -> Self {
+        simplified(self)
+    }
+}
+
+/// A [simplified](Tape::simplified) tape.
+fn simplified(tape: &Tape) -> Tape {
     let n = tape.inputs();
     let mut new = Simplifier { inputs: n, code: Vec::new(), places: HashMap::new() };
     // What each register of the old tape has become. The registers fit into `u32`, as `MOST_REGISTERS` does.

@@ -5,7 +5,6 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::Op;
-use crate::simplify::simplified;
 
 /// The largest number of registers of a tape, inputs and instructions together: a sweep back of that many holds 256 MiB.
 ///
@@ -173,22 +172,6 @@ impl Tape {
     #[must_use]
     pub fn registers(&self) -> usize {
         self.inputs + self.code.len()
-    }
-
-    /// Simplifies the tape, in one pass and with the same bits at `f64`.
-    ///
-    /// - Operations on constants are done now, and equal instructions are done once.
-    /// - A constant operand becomes the constant of its instruction; a quotient by a power of two becomes a product.
-    /// - `x + 0`, `x·1`, `x/1`, `x¹` and `−(−x)` become `x`, and `x⁰` becomes 1. The only bit that changes is the sign of
-    ///   `−0 + 0`. `x·0` stays, because it is not 0 where `x` is infinite or NaN.
-    /// - A product that only one sum reads becomes a part of that sum ([`Op::MulAdd`], [`Op::ScaleAdd`]), which rounds
-    ///   as often.
-    /// - What no output needs is left out.
-    ///
-    /// Derivatives are the same to round-off.
-    #[must_use]
-    pub fn simplified(&self) -> Self {
-        simplified(self)
     }
 }
 

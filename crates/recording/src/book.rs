@@ -70,7 +70,7 @@ impl Book {
     fn register(&mut self, number: Recorded) -> u32 {
         if number.identity.is_constant() {
             return self.push(Instruction {
-                op: Op::Constant,
+                op: Op::Literal,
                 operands: [0; 3],
                 constant: number.value,
             });

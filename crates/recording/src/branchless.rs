@@ -139,11 +139,11 @@ impl Branchless for Recorded {
     }
 
     fn and(self, other: Self) -> Self {
-        self.binary(Op::And, other, self.value.and(other.value))
+        self.binary(Op::LogicalAnd, other, self.value.and(other.value))
     }
 
     fn or(self, other: Self) -> Self {
-        self.binary(Op::Or, other, self.value.or(other.value))
+        self.binary(Op::LogicalOr, other, self.value.or(other.value))
     }
 
     fn negated(self) -> Self {
@@ -151,7 +151,7 @@ impl Branchless for Recorded {
         if self.is_constant() {
             Self::from_re(value)
         } else {
-            book::put(Op::Not, &[self], 0.0, value)
+            book::put(Op::LogicalNot, &[self], 0.0, value)
         }
     }
 

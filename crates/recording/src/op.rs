@@ -1,5 +1,7 @@
 //! The operations of a tape.
 
+// No variant has the name of a trait such as `Mul`: the compiler would then write the trait with its path in its messages
+// about closures.
 macro_rules! operations {
     ($($(#[doc = $doc:literal])* $name:ident $code:literal $operands:literal $constant:literal $text:literal,)*) => {
         /// An operation of a tape, on registers `a`, `b`, `c` and a constant `k`.
@@ -42,9 +44,9 @@ macro_rules! operations {
 
 operations! {
     /// The constant `k`.
-    Constant 0 0 true "constant",
+    Literal 0 0 true "constant",
     /// `−a`.
-    Neg 1 1 false "neg",
+    Negation 1 1 false "neg",
     /// `1/a`.
     Recip 2 1 false "recip",
     /// `√a`.
@@ -88,17 +90,17 @@ operations! {
     /// The sign of `a`, as [`f64::signum`] has it; its slope is 0.
     Sign 22 1 false "sign",
     /// 1 if `a = 0`, otherwise 0.
-    Not 23 1 false "not",
+    LogicalNot 23 1 false "not",
     /// `a + b`.
-    Add 24 2 false "add",
+    Addition 24 2 false "add",
     /// `a − b`.
-    Sub 25 2 false "sub",
+    Subtraction 25 2 false "sub",
     /// `a b`.
-    Mul 26 2 false "mul",
+    Multiplication 26 2 false "mul",
     /// `a / b`.
-    Div 27 2 false "div",
+    Division 27 2 false "div",
     /// `aᵇ`.
-    Pow 28 2 false "pow",
+    Power 28 2 false "pow",
     /// The angle of the point `(b, a)`, as [`f64::atan2`] has it.
     Atan2 29 2 false "atan2",
     /// `b` if `b < a`, otherwise `a`.
@@ -112,9 +114,9 @@ operations! {
     /// 1 if `a = b`, otherwise 0.
     Equal 34 2 false "equal",
     /// 1 if the conditions `a` and `b` hold, otherwise 0.
-    And 35 2 false "and",
+    LogicalAnd 35 2 false "and",
     /// 1 if the condition `a` or `b` holds, otherwise 0.
-    Or 36 2 false "or",
+    LogicalOr 36 2 false "or",
     /// `a + k`.
     AddConstant 37 1 true "add",
     /// `k − a`.
@@ -132,7 +134,7 @@ operations! {
     /// `b` if the condition `a` holds, otherwise `c`.
     Select 44 3 false "select",
     /// `a b + c`, rounded twice.
-    MulAdd 45 3 false "mul_add",
+    MultiplyAdd 45 3 false "mul_add",
     /// `a k + b`, rounded twice.
     ScaleAdd 46 2 true "scale_add",
 }
@@ -153,7 +155,15 @@ impl Op {
 
     /// Returns whether `a` and `b` may change places with the same bits.
     pub(crate) const fn commutes(self) -> bool {
-        matches!(self, Self::Add | Self::Mul | Self::Equal | Self::And | Self::Or | Self::MulAdd)
+        matches!(
+            self,
+            Self::Addition
+                | Self::Multiplication
+                | Self::Equal
+                | Self::LogicalAnd
+                | Self::LogicalOr
+                | Self::MultiplyAdd
+        )
     }
 }
 

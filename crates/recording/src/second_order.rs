@@ -56,15 +56,15 @@ impl Local {
         let surface =
             |slopes: [f64; 2], bends: [f64; 3]| Self { kind: Kind::Surface, slopes, bends, ..flat };
         match op {
-            Op::Constant
+            Op::Literal
             | Op::Sign
-            | Op::Not
+            | Op::LogicalNot
             | Op::Less
             | Op::LessEqual
             | Op::Equal
-            | Op::And
-            | Op::Or => flat,
-            Op::Neg | Op::ConstantSub => line(-1.0),
+            | Op::LogicalAnd
+            | Op::LogicalOr => flat,
+            Op::Negation | Op::ConstantSub => line(-1.0),
             Op::Recip => curve(-y * y, 2.0 * y * y * y),
             Op::Sqrt => curve(0.5 / y, -0.25 / (y * y * y)),
             Op::Cbrt => {
@@ -112,14 +112,14 @@ impl Local {
                 curve(slope, 2.0 * a * slope * slope)
             }
             Op::Abs => line(if a.is_sign_positive() { 1.0 } else { -1.0 }),
-            Op::Add => plane([1.0, 1.0]),
-            Op::Sub => plane([1.0, -1.0]),
-            Op::Mul => surface([b, a], [0.0, 1.0, 0.0]),
-            Op::Div => {
+            Op::Addition => plane([1.0, 1.0]),
+            Op::Subtraction => plane([1.0, -1.0]),
+            Op::Multiplication => surface([b, a], [0.0, 1.0, 0.0]),
+            Op::Division => {
                 let slope = 1.0 / b;
                 surface([slope, -y * slope], [0.0, -slope * slope, 2.0 * y * slope * slope])
             }
-            Op::Pow => {
+            Op::Power => {
                 let (first, second) = (a.powf(b - 1.0), a.powf(b - 2.0));
                 // 0ᵇ = 0 for all b > 0, and ln 0 is infinite.
                 let ln = if a == 0.0 { 0.0 } else { a.ln() };
@@ -150,7 +150,7 @@ impl Local {
             #[expect(clippy::float_cmp, reason = "only these exponents are linear")]
             Op::PowF if k == 1.0 => same(operands[0]),
             Op::PowF => curve(k * a.powf(k - 1.0), k * (k - 1.0) * a.powf(k - 2.0)),
-            Op::MulAdd => Self { kind: Kind::ProductAndSum, slopes: [b, a], ..flat },
+            Op::MultiplyAdd => Self { kind: Kind::ProductAndSum, slopes: [b, a], ..flat },
             Op::ScaleAdd => plane([k, 1.0]),
         }
     }

@@ -13,7 +13,7 @@ impl Tape {
     /// - A constant operand becomes the constant of its instruction; a quotient by a power of two becomes a product.
     /// - `x + 0`, `x·1`, `x/1`, `x¹` and `−(−x)` become `x`, and `x⁰` becomes 1. The only bit that changes is the sign of
     ///   `−0 + 0`. `x·0` stays, because it is not 0 where `x` is infinite or NaN.
-    /// - A product that only one sum reads becomes a part of that sum ([`Op::MulAdd`], [`Op::ScaleAdd`]), which rounds
+    /// - A product that only one sum reads becomes a part of that sum ([`Op::MultiplyAdd`], [`Op::ScaleAdd`]), which rounds
     ///   as often.
     /// - What no output needs is left out.
     ///
@@ -73,7 +73,7 @@ impl Simplifier {
     fn register(&mut self, value: Value) -> u32 {
         match value {
             Value::Register(register) => register,
-            Value::Constant(k) => self.put(Op::Constant, [0; 3], k),
+            Value::Constant(k) => self.put(Op::Literal, [0; 3], k),
         }
     }
 
@@ -99,7 +99,7 @@ impl Simplifier {
 
     /// `−x` if the register is `−x`.
     fn negated(&self, register: u32) -> Option<u32> {
-        self.source(register).filter(|one| one.op == Op::Neg).map(|one| one.operands[0])
+        self.source(register).filter(|one| one.op == Op::Negation).map(|one| one.operands[0])
     }
 
     /// Adds an operation on values.
@@ -113,30 +113,34 @@ impl Simplifier {
         let one = |x: u32| [Register(x), none, none];
         let two = |a: u32, b: u32| [Register(a), Register(b), none];
         match (op, values) {
-            (Op::Add, [Register(x), Constant(c), _] | [Constant(c), Register(x), _]) => {
+            (Op::Addition, [Register(x), Constant(c), _] | [Constant(c), Register(x), _]) => {
                 self.add(Op::AddConstant, one(x), c)
             }
-            (Op::Add, [Register(a), Register(b), _]) => {
+            (Op::Addition, [Register(a), Register(b), _]) => {
                 if let Some(b) = self.negated(b) {
-                    self.add(Op::Sub, two(a, b), 0.0)
+                    self.add(Op::Subtraction, two(a, b), 0.0)
                 } else if let Some(a) = self.negated(a) {
-                    self.add(Op::Sub, two(b, a), 0.0)
+                    self.add(Op::Subtraction, two(b, a), 0.0)
                 } else {
                     self.put_values(op, values, k)
                 }
             }
-            (Op::Sub, [Register(x), Constant(c), _]) => self.add(Op::AddConstant, one(x), -c),
-            (Op::Sub, [Constant(c), Register(x), _]) => self.add(Op::ConstantSub, one(x), c),
-            (Op::Sub, [Register(a), Register(b), _]) => match self.negated(b) {
-                Some(b) => self.add(Op::Add, two(a, b), 0.0),
+            (Op::Subtraction, [Register(x), Constant(c), _]) => {
+                self.add(Op::AddConstant, one(x), -c)
+            }
+            (Op::Subtraction, [Constant(c), Register(x), _]) => {
+                self.add(Op::ConstantSub, one(x), c)
+            }
+            (Op::Subtraction, [Register(a), Register(b), _]) => match self.negated(b) {
+                Some(b) => self.add(Op::Addition, two(a, b), 0.0),
                 None => self.put_values(op, values, k),
             },
-            (Op::Mul, [Register(x), Constant(c), _] | [Constant(c), Register(x), _]) => {
+            (Op::Multiplication, [Register(x), Constant(c), _] | [Constant(c), Register(x), _]) => {
                 self.add(Op::Scale, one(x), c)
             }
-            (Op::Div, [Register(x), Constant(c), _]) => self.add(Op::DivConstant, one(x), c),
-            (Op::Div, [Constant(c), Register(x), _]) => self.add(Op::ConstantDiv, one(x), c),
-            (Op::Pow, [Register(x), Constant(c), _]) => self.add(Op::PowF, one(x), c),
+            (Op::Division, [Register(x), Constant(c), _]) => self.add(Op::DivConstant, one(x), c),
+            (Op::Division, [Constant(c), Register(x), _]) => self.add(Op::ConstantDiv, one(x), c),
+            (Op::Power, [Register(x), Constant(c), _]) => self.add(Op::PowF, one(x), c),
             (Op::Select, [Constant(c), yes, no]) => {
                 if c == 0.0 {
                     no
@@ -144,24 +148,24 @@ impl Simplifier {
                     yes
                 }
             }
-            (Op::MulAdd, [a, b, c]) if [a, b, c].iter().any(Value::is_constant) => {
-                let product = self.add(Op::Mul, [a, b, none], 0.0);
-                self.add(Op::Add, [product, c, none], 0.0)
+            (Op::MultiplyAdd, [a, b, c]) if [a, b, c].iter().any(Value::is_constant) => {
+                let product = self.add(Op::Multiplication, [a, b, none], 0.0);
+                self.add(Op::Addition, [product, c, none], 0.0)
             }
             (Op::ScaleAdd, [a, b, _]) if [a, b].iter().any(Value::is_constant) => {
                 let product = self.add(Op::Scale, [a, none, none], k);
-                self.add(Op::Add, [product, b, none], 0.0)
+                self.add(Op::Addition, [product, b, none], 0.0)
             }
             (Op::AddConstant, [x, ..]) if k == 0.0 => x,
             (Op::Scale | Op::DivConstant | Op::PowI | Op::PowF, [x, ..]) if k == 1.0 => x,
-            (Op::Scale, _) if k == -1.0 => self.add(Op::Neg, values, 0.0),
+            (Op::Scale, _) if k == -1.0 => self.add(Op::Negation, values, 0.0),
             (Op::DivConstant, _) if has_exact_reciprocal(k) => self.add(Op::Scale, values, 1.0 / k),
             (Op::ConstantDiv, _) if k == 1.0 => self.add(Op::Recip, values, 0.0),
             (Op::PowI | Op::PowF, _) if k == 0.0 => Constant(1.0),
             (Op::PowI, [Register(x), ..]) if (-4..=4).contains(&integer(k)) => {
                 self.power(x, integer(k))
             }
-            (Op::Neg, [Register(x), ..]) => match self.negated(x) {
+            (Op::Negation, [Register(x), ..]) => match self.negated(x) {
                 Some(x) => Register(x),
                 None => self.put_values(op, values, k),
             },
@@ -180,7 +184,8 @@ impl Simplifier {
 
     /// Adds `xⁿ` for `|n| = 1 … 4` as products, in the order in which `powi` squares.
     fn power(&mut self, x: u32, n: i32) -> Value {
-        let product = |this: &mut Self, a: u32, b: u32| this.put(Op::Mul, [a, b, 0], 0.0);
+        let product =
+            |this: &mut Self, a: u32, b: u32| this.put(Op::Multiplication, [a, b, 0], 0.0);
         let power = match n.unsigned_abs() {
             1 => x,
             2 => product(self, x, x),
@@ -238,9 +243,11 @@ fn fuse(n: usize, code: &mut [Instruction], outputs: &[u32]) {
             let Instruction { op, operands: [x, y, _], constant } = code[place];
             let is_read_once = reads[product as usize] == 1 && product != other;
             match op {
-                Op::Mul if is_read_once && sign > 0.0 => {
-                    Some(Instruction { op: Op::MulAdd, operands: [x, y, other], constant: 0.0 })
-                }
+                Op::Multiplication if is_read_once && sign > 0.0 => Some(Instruction {
+                    op: Op::MultiplyAdd,
+                    operands: [x, y, other],
+                    constant: 0.0,
+                }),
                 Op::Scale if is_read_once => {
                     let constant = constant * sign;
                     Some(Instruction { op: Op::ScaleAdd, operands: [x, other, 0], constant })
@@ -249,8 +256,8 @@ fn fuse(n: usize, code: &mut [Instruction], outputs: &[u32]) {
             }
         };
         let better = match op {
-            Op::Add => joined(b, a, 1.0).or_else(|| joined(a, b, 1.0)),
-            Op::Sub => joined(b, a, -1.0),
+            Op::Addition => joined(b, a, 1.0).or_else(|| joined(a, b, 1.0)),
+            Op::Subtraction => joined(b, a, -1.0),
             _ => None,
         };
         if let Some(better) = better {

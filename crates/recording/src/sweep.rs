@@ -27,8 +27,8 @@ pub(crate) fn evaluate<D: Scalar>(instruction: &Instruction, r: &[D]) -> D {
     let &Instruction { op, operands: [a, b, c], constant: k } = instruction;
     let [a, b, c] = [a as usize, b as usize, c as usize];
     match op {
-        Op::Constant => D::from(k),
-        Op::Neg => -r[a],
+        Op::Literal => D::from(k),
+        Op::Negation => -r[a],
         Op::Recip => r[a].recip(),
         Op::Sqrt => r[a].sqrt(),
         Op::Cbrt => r[a].cbrt(),
@@ -50,19 +50,19 @@ pub(crate) fn evaluate<D: Scalar>(instruction: &Instruction, r: &[D]) -> D {
         Op::Atanh => r[a].atanh(),
         Op::Abs => Signed::abs(&r[a]),
         Op::Sign => D::from(r[a].re().signum()),
-        Op::Not => flag(!holds(&r[a])),
-        Op::Add => r[a] + r[b],
-        Op::Sub => r[a] - r[b],
-        Op::Mul => r[a] * r[b],
-        Op::Div => r[a] / r[b],
-        Op::Pow => r[a].powd(r[b]),
+        Op::LogicalNot => flag(!holds(&r[a])),
+        Op::Addition => r[a] + r[b],
+        Op::Subtraction => r[a] - r[b],
+        Op::Multiplication => r[a] * r[b],
+        Op::Division => r[a] / r[b],
+        Op::Power => r[a].powd(r[b]),
         Op::Atan2 => r[a].atan2(r[b]),
         Op::Min | Op::Max => r[if is_chosen_first(instruction, r) { a } else { b }],
         Op::Less => flag(r[a].re() < r[b].re()),
         Op::LessEqual => flag(r[a].re() <= r[b].re()),
         Op::Equal => flag(is_equal(&r[a], &r[b])),
-        Op::And => flag(holds(&r[a]) && holds(&r[b])),
-        Op::Or => flag(holds(&r[a]) || holds(&r[b])),
+        Op::LogicalAnd => flag(holds(&r[a]) && holds(&r[b])),
+        Op::LogicalOr => flag(holds(&r[a]) || holds(&r[b])),
         Op::AddConstant => r[a] + k,
         Op::ConstantSub => -r[a] + k,
         Op::Scale => r[a] * k,
@@ -71,7 +71,7 @@ pub(crate) fn evaluate<D: Scalar>(instruction: &Instruction, r: &[D]) -> D {
         Op::PowI => r[a].powi(integer(k)),
         Op::PowF => r[a].powf(k),
         Op::Select => r[if is_chosen_first(instruction, r) { b } else { c }],
-        Op::MulAdd => r[a] * r[b] + r[c],
+        Op::MultiplyAdd => r[a] * r[b] + r[c],
         Op::ScaleAdd => r[a] * k + r[b],
     }
 }
@@ -107,15 +107,15 @@ fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &[Cell<f
     let [a, b, c] = [a as usize, b as usize, c as usize];
     let add = |register: usize, part: f64| bar[register].set(bar[register].get() + part);
     match op {
-        Op::Constant
+        Op::Literal
         | Op::Sign
-        | Op::Not
+        | Op::LogicalNot
         | Op::Less
         | Op::LessEqual
         | Op::Equal
-        | Op::And
-        | Op::Or => {}
-        Op::Neg | Op::ConstantSub => add(a, -w),
+        | Op::LogicalAnd
+        | Op::LogicalOr => {}
+        Op::Negation | Op::ConstantSub => add(a, -w),
         Op::Recip => add(a, -(w * (y * y))),
         Op::Sqrt => add(a, w * 0.5 / y),
         Op::Cbrt => add(a, w / (y * y * 3.0)),
@@ -147,24 +147,24 @@ fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &[Cell<f
                 add(a, -w);
             }
         }
-        Op::Add => {
+        Op::Addition => {
             add(a, w);
             add(b, w);
         }
-        Op::Sub => {
+        Op::Subtraction => {
             add(a, w);
             add(b, -w);
         }
-        Op::Mul => {
+        Op::Multiplication => {
             add(a, w * r[b]);
             add(b, w * r[a]);
         }
-        Op::Div => {
+        Op::Division => {
             let quotient = w / r[b];
             add(a, quotient);
             add(b, -(quotient * y));
         }
-        Op::Pow => {
+        Op::Power => {
             add(a, w * r[b] * r[a].powf(r[b] - 1.0));
             // 0ᵇ = 0 for all b > 0, and ln 0 is infinite.
             if r[a] != 0.0 {
@@ -193,7 +193,7 @@ fn pull_back(instruction: &Instruction, r: &[f64], y: f64, w: f64, bar: &[Cell<f
             }
         }
         Op::Select => add(if is_chosen_first(instruction, r) { b } else { c }, w),
-        Op::MulAdd => {
+        Op::MultiplyAdd => {
             add(a, w * r[b]);
             add(b, w * r[a]);
             add(c, w);

@@ -76,7 +76,7 @@ impl fmt::Display for Instruction {
 /// ```
 /// use metriplectic_recording::{Op, Tape};
 /// // x y + sin x
-/// let code = [(Op::Sin.code(), [0, 0, 0], 0.0), (Op::MulAdd.code(), [0, 1, 2], 0.0)];
+/// let code = [(Op::Sin.code(), [0, 0, 0], 0.0), (Op::MultiplyAdd.code(), [0, 1, 2], 0.0)];
 /// let tape = Tape::from_parts(2, code, vec![3])?;
 /// let mut slope = [0.0; 2];
 /// assert_eq!(tape.gradient(&[0.0, 3.0], &mut slope), 0.0);
@@ -299,7 +299,7 @@ mod tests {
         let found = Tape::from_parts(1, [(1000, [0, 0, 0], 0.0)], vec![]);
         assert_eq!(found, Err(TapeError::UnknownOperation { instruction: 0, code: 1000 }));
         let ahead = TapeError::ReadsAhead { instruction: 0, register: 2, defined: 2 };
-        assert_eq!(one(Op::Add, [0, 2, 0], 0.0), Err(ahead));
+        assert_eq!(one(Op::Addition, [0, 2, 0], 0.0), Err(ahead));
         let unused = TapeError::Unused { instruction: 0, operation: "exp", operands: 1 };
         assert_eq!(one(Op::Exp, [0, 1, 0], 0.0), Err(unused));
         assert_eq!(one(Op::Exp, [0, 0, 0], 1.0), Err(unused));
@@ -324,7 +324,7 @@ mod tests {
     fn a_tape_has_at_most_so_many_registers() {
         const MOST: usize = 1 << 24;
         assert!(Tape::from_parts(MOST, [], vec![0]).is_ok());
-        let constant = (Op::Constant.code(), [0; 3], 0.0);
+        let constant = (Op::Literal.code(), [0; 3], 0.0);
         for inputs in [MOST, MOST + 1, usize::MAX] {
             assert_eq!(Tape::from_parts(inputs, [constant], vec![0]), Err(TapeError::TooLarge));
         }
@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn parts_and_text_say_all_of_a_tape() {
         let code = [
-            (Op::Constant.code(), [0, 0, 0], f64::from_bits(0x7ff8_0000_0000_1234)),
+            (Op::Literal.code(), [0, 0, 0], f64::from_bits(0x7ff8_0000_0000_1234)),
             (Op::Select.code(), [1, 0, 2], 0.0),
             (Op::ScaleAdd.code(), [3, 2, 0], 0.1),
         ];

@@ -61,7 +61,7 @@ fn each_operation_has_the_derivatives_of_dual_numbers() {
                 let code = [
                     (op.code(), operands, k),
                     (Op::Sin.code(), [3, 0, 0], 0.0),
-                    (Op::Mul.code(), [3, 4, 0], 0.0),
+                    (Op::Multiplication.code(), [3, 4, 0], 0.0),
                 ];
                 let tape = Tape::from_parts(3, code, vec![5]).unwrap();
                 for x in &points {
@@ -118,7 +118,7 @@ fn slopes_keep_their_digits_at_the_edges() {
 fn a_branch_that_is_not_taken_leaves_nothing() {
     // where(p > 0, √p, 0) at −1.
     let code = [
-        (Op::Constant.code(), [0; 3], 0.0),
+        (Op::Literal.code(), [0; 3], 0.0),
         (Op::Less.code(), [1, 0, 0], 0.0),
         (Op::Sqrt.code(), [0; 3], 0.0),
         (Op::Select.code(), [2, 3, 1], 0.0),
@@ -292,8 +292,8 @@ proptest! {
         // Twice simplified is simplified.
         prop_assert_eq!(simple.simplified().code().len(), simple.code().len());
         // A recording of the tape is the same function; conditions ask for values.
-        let asks = |op: Op| matches!(op, Op::Sign | Op::Not | Op::Min | Op::Max | Op::Less | Op::LessEqual
-            | Op::Equal | Op::And | Op::Or | Op::Select);
+        let asks = |op: Op| matches!(op, Op::Sign | Op::LogicalNot | Op::Min | Op::Max | Op::Less | Op::LessEqual
+            | Op::Equal | Op::LogicalAnd | Op::LogicalOr | Op::Select);
         let again = record(&x, |x| {
             let mut y = vec![Recorded::from(0.0); registers];
             tape.evaluate(x, &mut y);
@@ -362,7 +362,7 @@ fn a_million_instructions_work() {
     }
     assert_eq!(value, sum);
     assert!((slopes[1] - along).abs() < 1e-12 * along.abs(), "{slopes:?} and {along}");
-    let constant = (Op::Constant.code(), [0; 3], 1.0);
+    let constant = (Op::Literal.code(), [0; 3], 1.0);
     let long =
         Tape::from_parts(0, std::iter::repeat_n(constant, 1_000_000), vec![999_999]).unwrap();
     assert_eq!(long.simplified().code().len(), 1);

@@ -14,7 +14,7 @@ impl Recorded {
         match (self.is_constant(), other.is_constant()) {
             (false, true) => self.with_constant(Op::AddConstant, other.value, value),
             (true, false) => other.with_constant(Op::AddConstant, self.value, value),
-            _ => self.binary(Op::Add, other, value),
+            _ => self.binary(Op::Addition, other, value),
         }
     }
 
@@ -23,7 +23,7 @@ impl Recorded {
         match (self.is_constant(), other.is_constant()) {
             (false, true) => self.with_constant(Op::AddConstant, -other.value, value),
             (true, false) => other.with_constant(Op::ConstantSub, self.value, value),
-            _ => self.binary(Op::Sub, other, value),
+            _ => self.binary(Op::Subtraction, other, value),
         }
     }
 
@@ -32,7 +32,7 @@ impl Recorded {
         match (self.is_constant(), other.is_constant()) {
             (false, true) => self.with_constant(Op::Scale, other.value, value),
             (true, false) => other.with_constant(Op::Scale, self.value, value),
-            _ => self.binary(Op::Mul, other, value),
+            _ => self.binary(Op::Multiplication, other, value),
         }
     }
 
@@ -41,7 +41,7 @@ impl Recorded {
         match (self.is_constant(), other.is_constant()) {
             (false, true) => self.with_constant(Op::DivConstant, other.value, value),
             (true, false) => other.with_constant(Op::ConstantDiv, self.value, value),
-            _ => self.binary(Op::Div, other, value),
+            _ => self.binary(Op::Division, other, value),
         }
     }
 
@@ -121,7 +121,7 @@ operators! {
 impl Neg for Recorded {
     type Output = Self;
     fn neg(self) -> Self {
-        self.unary(Op::Neg, -self.value)
+        self.unary(Op::Negation, -self.value)
     }
 }
 

@@ -159,7 +159,7 @@ impl DualNum for Recorded {
     }
 
     fn powd(&self, n: Self) -> Self {
-        self.binary(Op::Pow, n, self.value.powf(n.value))
+        self.binary(Op::Power, n, self.value.powf(n.value))
     }
 
     fn exp2(&self) -> Self {
@@ -205,7 +205,7 @@ impl DualNum for Recorded {
         if [*self, a, b].into_iter().any(Self::is_constant) {
             return *self * a + b;
         }
-        book::put(Op::MulAdd, &[*self, a, b], 0.0, self.value * a.value + b.value)
+        book::put(Op::MultiplyAdd, &[*self, a, b], 0.0, self.value * a.value + b.value)
     }
 }
 

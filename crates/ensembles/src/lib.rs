@@ -62,8 +62,8 @@ mod figures;
 mod fingerprint;
 mod interrupt;
 mod journal;
-#[cfg(feature = "serde")]
 mod listed;
+#[cfg(feature = "serde")]
 mod long;
 mod plan;
 mod record;

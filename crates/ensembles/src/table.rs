@@ -15,7 +15,6 @@ use crate::figures::FIGURES;
 use crate::journal::{Header, merged};
 use crate::shard::of_shard;
 
-#[cfg(feature = "serde")]
 pub use time::Series;
 
 /// The rows of a sweep. Its numbers do not depend on threads, shards, or how often the sweep was put down.

@@ -60,10 +60,6 @@ pub(crate) fn sum_of_terms<V: Column<f64>>(w: &V, v: &V) -> f64 {
     (0..V::LEN).fold(0.0, |sum, i| sum + (w[i] * v[i]).abs())
 }
 
-/// The most entries of a point that is made anew for each pair of seeds, and not copied: the numbers are the same, and only the
-/// instructions differ.
-pub(crate) const FEW: usize = 6;
-
 /// The charts of a part of a vector space.
 macro_rules! translations {
     ($space:ident, $is_vector_space:literal) => {
@@ -87,17 +83,12 @@ macro_rules! translations {
                 Column::from_index(|i| q[i] + x[i])
             }
 
-            /// A copy of the point in which two entries are seeded, where it has many.
+            /// A copy of the point in which two entries are seeded.
             #[inline]
             fn seeds(x: &SVector<f64, N>) -> impl Fn(usize, usize) -> SVector<Real, N> {
-                let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
                 // The sum of the chart, which has no zero with a sign.
                 let x: SVector<Real, N> = Column::from_index(|k| Real::from(0.0 + x[k]));
                 move |i, j| {
-                    if const { N <= $crate::euclidean::FEW } {
-                        let seed = |k: usize| Real::new(x[k].re, part(k, i), part(k, j), 0.0);
-                        return Column::from_index(seed);
-                    }
                     let mut seeded = x;
                     if i < N {
                         seeded[i].eps1 = 1.0;

@@ -46,14 +46,16 @@
 //! | 24 | 28,714 | 8167 | 715,868 | 86,144 |
 //! | 48 | 120,747 | 19,607 | 5,931,070 | 275,868 |
 //!
-//! Derivatives of the energy are a part of a step. Instructions of whole steps of the program above:
+//! Derivatives of the energy are a part of a step. Instructions of whole steps of a ring of eight oscillators with heat, 24 variables
+//! (rows `run/ring_24` of `just instructions`):
 //!
-//! | method | closure | tape |
+//! | method | closures | tapes |
 //! |---|--:|--:|
-//! | `DormandPrince5` | 295,379 | 110,568 |
-//! | `DormandPrince8` | 453,489 | 168,874 |
-//! | `WeylMidpoint` | 144,961 | 94,698 |
-//! | `Gauss::<3>` | 1,956,856 | 1,211,383 |
+//! | `DormandPrince5` | 145,625 | 60,898 |
+//! | `DormandPrince8` | 291,809 | 114,277 |
+//! | `WeylMidpoint` | 114,357 | 68,696 |
+//! | `Gauss::<3>` | 748,105 | 618,209 |
+//! | `Radau::<2>` | 965,198 | 834,429 |
 //!
 //! A recorded field takes the faster one of closure and tape by itself. A sweep needs room for a few numbers for each
 //! operation, and each thread keeps it from one evaluation to the next.

@@ -139,7 +139,7 @@ impl<Y: ?Sized> Clone for Verified<'_, Y> {
 
 impl<Y: ?Sized> Copy for Verified<'_, Y> {}
 
-/// Whether the laws of a system have been verified around the start of a run of it.
+/// Notes that the laws of a system have been verified around the start of a run of it.
 #[doc(hidden)]
 #[derive(Debug, Default)]
 pub struct Begun(AtomicBool);

@@ -28,7 +28,7 @@ pub enum SweepError {
     Interrupted {
         /// The rows so far.
         table: Box<Table>,
-        /// Whether there is a journal from which it goes on.
+        /// Says that there is a journal from which it goes on.
         journal: bool,
     },
 }

@@ -64,7 +64,7 @@ enum Value {
 struct Simplifier {
     inputs: usize,
     code: Vec<Instruction>,
-    /// Where each instruction stands.
+    /// The place of each instruction.
     places: HashMap<(Op, [u32; 3], u64), u32>,
 }
 

@@ -310,7 +310,7 @@ impl AlmostPoisson {
 }
 
 /// A constant matrix that is not a Poisson tensor.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoissonError {
     /// An entry is NaN or infinite.
@@ -334,3 +334,5 @@ pub enum PoissonError {
         size: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(PoissonError);

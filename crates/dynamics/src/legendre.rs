@@ -210,7 +210,7 @@ fn not_finite<const N: usize>(xi: &SVector<f64, N>) -> LegendreError {
 }
 
 /// A momentum without a velocity.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LegendreError {
     /// The Lagrangian or a derivative is not a number where Newton's method starts.
@@ -247,6 +247,8 @@ pub enum LegendreError {
         iterations: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(LegendreError);
 
 #[cfg(test)]
 mod tests {

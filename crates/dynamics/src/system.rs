@@ -261,7 +261,7 @@ where
 }
 
 /// Parts that do not make a system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
     /// Neither a bracket nor an entropy.
@@ -282,3 +282,5 @@ pub enum BuildError {
         dimension: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(BuildError);

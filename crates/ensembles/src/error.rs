@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::listed::listed;
 
 /// A plan of rows that makes no sense.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
     /// The name is empty.
@@ -72,8 +72,10 @@ pub enum PlanError {
     },
 }
 
+metriplectic_equations::debug_is_the_sentence!(PlanError);
+
 /// A journal that cannot be read or written.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum JournalError {
     /// The file cannot be opened, read or written.
@@ -163,8 +165,10 @@ pub enum JournalError {
     None,
 }
 
+metriplectic_equations::debug_is_the_sentence!(JournalError);
+
 /// A question that a table cannot answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
     /// There is no such column.
@@ -208,3 +212,7 @@ pub enum TableError {
         rows: Vec<usize>,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(TableError);
+
+metriplectic_integrators::passed_on_as_error!(JournalError, PlanError, TableError);

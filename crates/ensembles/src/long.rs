@@ -41,17 +41,21 @@ struct Place {
 }
 
 /// A row that was put down because of a signal. It is no failure.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[error("the row was put down, and goes on when the sweep is started again")]
 struct PutDown;
 
+metriplectic_equations::debug_is_the_sentence!(PutDown);
+
 /// A checkpoint that cannot be written or read.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[error("the checkpoint {} of the row: {problem}", path.display())]
 struct CheckpointError {
     path: PathBuf,
     problem: String,
 }
+
+metriplectic_equations::debug_is_the_sentence!(CheckpointError);
 
 /// Steps between two looks at the clock.
 const GLANCE: usize = 64;

@@ -35,7 +35,7 @@ pub struct Shard {
 }
 
 /// A shard that the environment or the command line does not say clearly.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShardError {
     /// There is no such shard.
@@ -89,6 +89,10 @@ pub enum ShardError {
         step: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(ShardError);
+
+metriplectic_integrators::passed_on_as_error!(ShardError);
 
 /// The values of the variables of an environment.
 type Variables<'a> = &'a dyn Fn(&str) -> Option<String>;

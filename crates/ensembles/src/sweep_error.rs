@@ -1,7 +1,5 @@
 //! The error of a sweep that did not finish, with the rows so far.
 
-use std::fmt;
-
 use crate::error::{JournalError, PlanError};
 use crate::table::Table;
 
@@ -49,9 +47,6 @@ const fn advice(journal: bool) -> &'static str {
     if journal { "; run it again, and it goes on" } else { "" }
 }
 
-/// Prints the sentence, which is what a `main` that returns the error shows.
-impl fmt::Debug for SweepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(SweepError);
+
+metriplectic_integrators::passed_on_as_error!(SweepError);

@@ -1,7 +1,7 @@
 //! A law that does not hold.
 
 /// A law that does not hold, with the size of the violation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[error("law broken: {law}: {size:.3e}, where {bound:.1e} is allowed")]
 pub struct BrokenLaw {
     /// The law as a sentence.
@@ -11,6 +11,8 @@ pub struct BrokenLaw {
     /// The size that is allowed.
     pub bound: f64,
 }
+
+crate::debug_is_the_sentence!(BrokenLaw);
 
 impl BrokenLaw {
     /// Returns `Ok` if `size ≤ bound`. NaN breaks every law.

@@ -43,6 +43,7 @@ mod pointers;
 pub mod report;
 pub mod room;
 pub mod second_law;
+mod sentence;
 pub mod terms;
 
 pub use broken_law::BrokenLaw;

@@ -1,7 +1,7 @@
 //! A metric that cannot be used.
 
 /// A metric that cannot be used.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricError {
     /// An entry is NaN or infinite.
@@ -120,8 +120,10 @@ pub enum MetricError {
     },
 }
 
+crate::debug_is_the_sentence!(MetricError);
+
 /// A matrix that should be positive definite has a pivot that is not.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[error("not positive definite: the Cholesky pivot {index} is {pivot:.3e}")]
 pub struct NotPositive {
     /// The row of the failing pivot.
@@ -129,3 +131,5 @@ pub struct NotPositive {
     /// Its value.
     pub pivot: f64,
 }
+
+crate::debug_is_the_sentence!(NotPositive);

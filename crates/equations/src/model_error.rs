@@ -1,6 +1,5 @@
 //! The laws that a model violates, with the numbers.
 
-use std::fmt;
 use std::sync::Arc;
 
 use crate::{MetricError, PointError};
@@ -442,9 +441,4 @@ pub enum ModelError {
     },
 }
 
-/// The sentence of the `Display` form, which is what a `main` that returns the error prints.
-impl fmt::Debug for ModelError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+crate::debug_is_the_sentence!(ModelError);

@@ -1,7 +1,7 @@
 //! Errors of entries that are not a state.
 
 /// A point that is not on the manifold.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PointError {
     /// An entry is NaN or infinite.
@@ -37,3 +37,5 @@ pub enum PointError {
         allowed: f64,
     },
 }
+
+crate::debug_is_the_sentence!(PointError);

@@ -1,7 +1,5 @@
 //! Why there is no fit.
 
-use std::fmt;
-
 /// Data, options or a model that cannot be fitted.
 #[derive(thiserror::Error)]
 #[non_exhaustive]
@@ -100,8 +98,6 @@ pub enum FitError {
     },
 }
 
-impl fmt::Debug for FitError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(FitError);
+
+metriplectic_integrators::passed_on_as_error!(FitError);

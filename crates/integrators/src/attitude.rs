@@ -246,7 +246,7 @@ fn smallest_rotation(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Why there is no attitude.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttitudeError {
     /// The initial attitude is not a rotation.
@@ -273,3 +273,5 @@ pub enum AttitudeError {
     #[error(transparent)]
     Metric(#[from] MetricError),
 }
+
+metriplectic_equations::debug_is_the_sentence!(AttitudeError);

@@ -1,18 +1,26 @@
-//! Errors of runs.
+//! The errors of the library in one.
 //!
-//! A `main` that returns an error prints its `Debug` form. For the errors of this module that is
-//! the sentence of their `Display` form.
-
-use std::fmt;
+//! A `main` that returns an error prints its `Debug` form. That is the sentence of the `Display` form, for each error of the
+//! library.
 
 use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
+use metriplectic_equations::{BrokenLaw, NotPositive};
 use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
+use metriplectic_recording::{RecordingError, TapeError};
 
 use crate::attitude::AttitudeError;
-use crate::noise::NoisyError;
+use crate::explicit::TableauError;
+use crate::implicit::NoImplicitSteps;
+use crate::noise::{NoiseError, NoisyError};
+use crate::open::NotDamped;
 use crate::run::checkpoint::ResumeError;
+use crate::run::observables::ObservablesError;
+use crate::run::paired::Unpaired;
 use crate::run::span_error::SpanError;
-use crate::step::{MethodError, StartError, StateSpace, StepError};
+use crate::step::{
+    JumpError, MethodError, Panicked, RestoreError, StartError, StateSpace, StepError,
+};
+use crate::tangent::{TangentError, Unlinearised};
 
 pub use crate::run::error::RunError;
 pub use crate::step::FlowError;
@@ -70,6 +78,63 @@ pub enum Error {
     /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
     #[error("{0}")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// An error of another part of the library, or of the program: see [`Error::other`].
+    #[error("{0}")]
+    Other(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl Error {
+    /// Wraps an error of another type, which can be downcast from the [source](std::error::Error::source). `?` does it for each error
+    /// of the library.
+    ///
+    /// ```
+    /// use metriplectic_integrators::Error;
+    ///
+    /// fn start(line: &str) -> Result<f64, Error> {
+    ///     line.parse().map_err(Error::other)
+    /// }
+    /// assert_eq!(format!("{:?}", start("fast").unwrap_err()), "invalid float literal");
+    /// ```
+    pub fn other(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Other(error.into())
+    }
+}
+
+/// Lets `?` pass errors on as [`Error`], by [`Error::other`].
+#[doc(hidden)]
+#[macro_export]
+macro_rules! passed_on_as_error {
+    ($($error:ty),* $(,)?) => {$(
+        impl From<$error> for $crate::Error {
+            fn from(error: $error) -> Self {
+                Self::other(error)
+            }
+        }
+    )*};
+}
+
+passed_on_as_error!(
+    BrokenLaw,
+    JumpError,
+    NoImplicitSteps,
+    NoiseError,
+    NotDamped,
+    NotPositive,
+    Panicked,
+    ObservablesError,
+    RecordingError,
+    RestoreError,
+    TableauError,
+    TapeError,
+    Unlinearised,
+    Unpaired,
+    std::io::Error,
+);
+
+impl<M: StateSpace> From<TangentError<M>> for Error {
+    fn from(error: TangentError<M>) -> Self {
+        Self::other(error)
+    }
 }
 
 impl<M: StateSpace> From<RunError<M>> for Error {
@@ -85,17 +150,13 @@ impl<M: StateSpace> From<RunError<M>> for Error {
     }
 }
 
-impl From<NoisyError> for Error {
-    fn from(error: NoisyError) -> Self {
+impl<E: std::error::Error + Into<Self> + 'static> From<NoisyError<E>> for Error {
+    fn from(error: NoisyError<E>) -> Self {
         match error {
-            NoisyError::Model(error) => Self::Model(error),
+            NoisyError::Model(error) => error.into(),
             NoisyError::Noise(error) => Self::Flow(FlowError::new(error)),
         }
     }
 }
 
-impl fmt::Debug for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(Error);

@@ -21,8 +21,8 @@
 //! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |
+//! | [`error`](mod@error) | [`Error`]: everything that can go wrong, for `?` | those with an error of their own |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
-//! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`noise`](mod@noise), [`attitude`] |
 //!
 //! # What a later version may add
 //!
@@ -79,7 +79,7 @@ pub use run::certificate::{
 pub use run::checkpoint::{Checkpoint, ResumeError};
 pub use run::event::Event;
 pub use run::jump::{Jump, JumpBalance};
-pub use run::observables::{Csv, Npy, Observables, TableError};
+pub use run::observables::{Csv, Npy, Observables, ObservablesError};
 pub use run::paired::Unpaired;
 pub use run::span::Span;
 pub use run::steps::Steps;

@@ -3,7 +3,7 @@
 //! A room is a module of the crate, with all files below it. A file names another file in a `use` or in a path that
 //! begins with `crate` or `super`; a name that a module re-exports belongs to the file that defines it, and to re-export
 //! a name is not to use it. Tests inside the files are left out. A method of a type whose `impl` stands in several files is
-//! not seen.
+//! not seen. The errors of all crates are read in the same way.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -54,7 +54,6 @@ const ROOMS: [(&str, &[&str]); 20] = [
     ),
     ("default_scheme", &["step", "midpoint"]),
     ("attitude", &["round_off", "run"]),
-    ("error", &["step", "run", "noise", "attitude"]),
     (
         "tangent",
         &[
@@ -73,6 +72,7 @@ const ROOMS: [(&str, &[&str]); 20] = [
             "open",
         ],
     ),
+    ("error", &["step", "explicit", "implicit", "run", "noise", "open", "attitude", "tangent"]),
     ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),
 ];
 
@@ -117,19 +117,79 @@ fn files_of_a_room_form_no_circle_but_pairs() {
 
 #[test]
 fn files_of_no_crate_form_a_circle_of_three() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of the crates");
-    let mut count = 0;
-    for entry in fs::read_dir(crates).expect("the crates") {
-        let root = entry.expect("a crate").path().join("src");
-        let mut files = Files::new();
-        read_folder(&root, &root, &mut files);
+    for (name, files) in crates() {
         let graph = graph(&files);
         for circle in circles(&graph) {
-            assert!(circle.len() <= 2, "{}: {circle:?}", root.display());
+            assert!(circle.len() <= 2, "{name}: {circle:?}");
         }
-        count += 1;
     }
-    assert!(count > 8, "{count} crates");
+}
+
+/// The sources of each crate, except the tools of the figures.
+fn crates() -> BTreeMap<String, Files> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of the crates");
+    let sources = |entry: fs::DirEntry| {
+        let (root, mut files) = (entry.path().join("src"), Files::new());
+        read_folder(&root, &root, &mut files);
+        (entry.file_name().to_string_lossy().into_owned(), files)
+    };
+    let entries = fs::read_dir(folder).expect("the crates");
+    let mut crates: BTreeMap<_, _> =
+        entries.map(|entry| sources(entry.expect("a crate"))).collect();
+    crates.remove("studies");
+    assert!(crates.len() > 8, "{} crates", crates.len());
+    crates
+}
+
+/// The types in a file that derive `Error`, each with what it derives and whether it is public.
+fn errors(text: &str) -> Vec<(String, String, bool)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let derives = lines.iter().enumerate().filter_map(|(k, line)| {
+        let derived = line.strip_prefix("#[derive(")?.strip_suffix(")]")?;
+        derived.ends_with("Error").then_some((k, derived))
+    });
+    let typed = |(k, derived): (usize, &str)| {
+        let head =
+            lines[k..].iter().find(|line| line.contains("enum ") || line.contains("struct "));
+        let head = head.expect("a type");
+        let name =
+            head.split(['<', '(', ';', '{']).next().and_then(|head| head.split_whitespace().last());
+        (name.expect("a name").to_owned(), derived.to_owned(), head.starts_with("pub "))
+    };
+    derives.map(typed).collect()
+}
+
+/// A `main` that returns an error prints its `Debug` form, and `?` in it makes an `Error` of each.
+#[test]
+fn every_error_prints_its_sentence_and_is_passed_on() {
+    let crates = crates();
+    let code: Vec<&String> = crates.values().flat_map(BTreeMap::values).collect();
+    let passed_on = |name: &str| {
+        let ways = [format!("(#[from] {name})"), format!("From<{name}>"), format!("From<{name}<")];
+        let lists = code.iter().flat_map(|text| text.split("passed_on_as_error!(").skip(1));
+        let mut listed = lists.filter_map(|list| list.split(')').next());
+        code.iter().any(|text| ways.iter().any(|way| text.contains(way)))
+            || listed
+                .any(|list| list.split(|c: char| !c.is_alphanumeric()).any(|word| word == name))
+    };
+    let mut count = 0;
+    for (name, files) in &crates {
+        for (module, text) in files {
+            for (error, derived, public) in errors(text) {
+                assert!(!derived.contains("Debug"), "{name}/{module}: {error} derives Debug");
+                let macros = text.split("debug_is_the_sentence!(").skip(1);
+                let mut printed = macros.filter_map(|list| list.split(");").next());
+                let words = |list: &str| list.split(['<', ' ', ']']).any(|word| word == error);
+                assert!(printed.any(words), "{name}/{module}: {error} prints no sentence");
+                assert!(
+                    !public || error == "Error" || passed_on(&error),
+                    "{name}/{module}: {error} is no `Error`"
+                );
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 35, "{count} errors");
 }
 
 /// The sets of files of which each reaches the others.

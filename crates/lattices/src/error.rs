@@ -184,12 +184,7 @@ pub enum LatticeError {
     Surroundings(Box<ModelError>),
 }
 
-/// The sentence of the `Display` form, which is what a `main` that returns the error prints.
-impl fmt::Debug for LatticeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(LatticeError);
 
 /// The entries of a state, if they are known.
 struct Entries<'a>(&'a [f64]);
@@ -258,3 +253,5 @@ impl fmt::Display for Place {
         }
     }
 }
+
+metriplectic_integrators::passed_on_as_error!(LatticeError);

@@ -181,7 +181,7 @@ fn finite_maximum<const N: usize>(constants: &[[[f64; N]; N]; N]) -> Result<f64,
 }
 
 /// Structure constants that do not make a Lie algebra.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AlgebraError {
     /// A constant is NaN or infinite.
@@ -239,3 +239,5 @@ pub enum AlgebraError {
         size: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(AlgebraError);

@@ -36,7 +36,7 @@ pub fn record(x: &[f64], f: impl Fn(&[Recorded]) -> Vec<Recorded>) -> Result<Tap
 }
 
 /// A function that cannot be recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
     /// The function asks for the value of a number that depends on the state, and may branch on it.
@@ -94,3 +94,5 @@ pub enum RecordingError {
         expected: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(RecordingError);

@@ -219,7 +219,7 @@ impl fmt::Display for Tape {
 }
 
 /// A list of numbers that is no tape.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TapeError {
     /// More than [`MOST_REGISTERS`] inputs and instructions, or outputs.
@@ -285,6 +285,8 @@ pub enum TapeError {
         registers: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(TapeError);
 
 #[cfg(test)]
 mod tests {

@@ -23,7 +23,7 @@ pub struct Gallery {
 }
 
 /// A file or folder of the gallery that could not be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[error("cannot write {}: {source}; is there a place left, and may one write to it?", path.display())]
 pub struct GalleryError {
     /// The file or folder.
@@ -31,6 +31,8 @@ pub struct GalleryError {
     /// The error of the system.
     pub source: io::Error,
 }
+
+metriplectic_equations::debug_is_the_sentence!(GalleryError);
 
 impl Gallery {
     /// Opens the gallery, creating its folder where needed: `$CARGO_TARGET_DIR/gallery`, or else

@@ -44,7 +44,7 @@ pub struct Order {
 }
 
 /// Why no order could be fitted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrderError {
     /// The slices differ in length.
@@ -115,6 +115,8 @@ pub enum OrderError {
         lower: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(OrderError);
 
 impl Order {
     /// Fits `ln error = ln C + p ln h` by ordinary least squares, `error[i]` measured at `steps[i]`,

@@ -11,7 +11,7 @@ use svg::node::element::{self, Element, Group, Rectangle};
 pub use crate::{globe::Globe, log_log::LogLog, panel::Panel, panels::Panels};
 
 /// Why a figure could not be drawn.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
     /// The figure, panel or line of this name has nothing in it.
@@ -42,6 +42,8 @@ pub enum PlotError {
         source: io::Error,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(PlotError);
 
 pub(crate) const INK: &str = "#222222";
 pub(crate) const GREY: &str = "#777777";

@@ -143,7 +143,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Dissipation<LieDual<N>, G>
 }
 
 /// A matrix that is not a positive semidefinite form.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormError {
     /// An entry is NaN or infinite.
@@ -173,6 +173,8 @@ pub enum FormError {
         eigenvalue: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(FormError);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! Why no run starts with a tableau.
 
 /// A tableau with which no run starts.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableauError {
     /// There are too many stages.
@@ -99,3 +99,5 @@ pub enum TableauError {
         order: u32,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(TableauError);

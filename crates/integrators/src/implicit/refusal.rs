@@ -5,7 +5,7 @@ use metriplectic_equations::{ByCharts, Equations, Path, Paths as _, Sizes};
 use super::parts::is_flat;
 
 /// A system, or a method, without implicit steps in plain numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoImplicitSteps {
     /// The parts of the system are not known apart.
@@ -42,6 +42,8 @@ pub enum NoImplicitSteps {
         variables: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(NoImplicitSteps);
 
 /// The most variables of a system with implicit steps: a Jacobian of 1024 has a million entries, and its inverse takes a billion
 /// operations.

@@ -5,7 +5,7 @@ use metriplectic_dynamics::ModelError;
 /// Why a system has no noise of this kind, or a method cannot sample it. It is in
 /// [`RunError::Flow`](crate::RunError::Flow), [`RunError::Method`](crate::RunError::Method) or
 /// [`StepError::Method`](crate::StepError::Method), and can be downcast from it.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoiseError {
     /// Boltzmann's constant is not a positive number.
@@ -215,8 +215,10 @@ pub enum NoiseError {
     DriftUnresolved,
 }
 
+metriplectic_equations::debug_is_the_sentence!(NoiseError);
+
 /// Why a system with noise is not verified.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoisyError<E: std::error::Error + 'static = ModelError> {
     /// A model that breaks one of its laws.
@@ -226,6 +228,8 @@ pub enum NoisyError<E: std::error::Error + 'static = ModelError> {
     #[error(transparent)]
     Noise(#[from] NoiseError),
 }
+
+metriplectic_equations::debug_is_the_sentence!([E: std::error::Error + 'static] NoisyError<E>);
 
 impl From<ModelError> for NoisyError {
     fn from(law: ModelError) -> Self {

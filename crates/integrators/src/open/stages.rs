@@ -296,12 +296,14 @@ where
 }
 
 /// Why `Radau` does not take an open system, in the [`MethodError`] of its step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
      `Gauss`, or an explicit method"
 )]
 pub struct NotDamped;
+
+metriplectic_equations::debug_is_the_sentence!(NotDamped);
 
 /// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
 fn damps<Y, C, X>(

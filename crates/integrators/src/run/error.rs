@@ -1,7 +1,5 @@
 //! A run that did not finish.
 
-use std::fmt;
-
 use metriplectic_dynamics::ModelError;
 
 use crate::run::span_error::SpanError;
@@ -49,8 +47,4 @@ impl<M: StateSpace> RunError<M> {
     }
 }
 
-impl<M: StateSpace> fmt::Debug for RunError<M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!([M: StateSpace] RunError<M>);

@@ -42,7 +42,7 @@
 //! memory is written when the table is finished or dropped: a run that is interrupted leaves a file
 //! that can be read. The first column is always the time.
 //!
-//! If the disk is full, the error says how many rows are in the file as a whole ([`TableError`]). Behind a buffer,
+//! If the disk is full, the error says how many rows are in the file as a whole ([`ObservablesError`]). Behind a buffer,
 //! such as a `BufWriter`, there may be more of them. What
 //! could not be written stays in memory, and the next call goes on where this one ended: once there is room,
 //! the file is the one that it would have been. Until then an array has the rows that its header counts, and
@@ -61,9 +61,9 @@ pub use csv::{Csv, quoted};
 pub use npy::{Npy, npy_header};
 
 /// A table that cannot be written; the source of an [`io::Error`] of this module.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
-pub enum TableError {
+pub enum ObservablesError {
     /// Two columns have one name, and no reader could tell them apart.
     #[error("two columns have the name {name:?}; the time has the name \"t\" already")]
     SameName {
@@ -82,11 +82,13 @@ pub enum TableError {
     },
 }
 
-impl From<TableError> for io::Error {
-    fn from(error: TableError) -> Self {
+metriplectic_equations::debug_is_the_sentence!(ObservablesError);
+
+impl From<ObservablesError> for io::Error {
+    fn from(error: ObservablesError) -> Self {
         let kind = match &error {
-            TableError::SameName { .. } => io::ErrorKind::InvalidInput,
-            TableError::Write { source, .. } => source.kind(),
+            ObservablesError::SameName { .. } => io::ErrorKind::InvalidInput,
+            ObservablesError::Write { source, .. } => source.kind(),
         };
         Self::new(kind, error)
     }
@@ -149,7 +151,7 @@ impl<'a, M: StateSpace> Observables<'a, M> {
     ///
     /// # Errors
     ///
-    /// [`TableError`]: two columns of one name, and those of writing to `to`.
+    /// [`ObservablesError`]: two columns of one name, and those of writing to `to`.
     pub fn csv<W: Write>(&self, to: W) -> io::Result<Csv<'_, M, W>> {
         self.check_names()?;
         let names: Vec<_> = self.names().map(quoted).collect();
@@ -168,7 +170,7 @@ impl<'a, M: StateSpace> Observables<'a, M> {
     ///
     /// # Errors
     ///
-    /// [`TableError`]: two columns of one name, and those of writing to `to`.
+    /// [`ObservablesError`]: two columns of one name, and those of writing to `to`.
     pub fn npy<W: Write + Seek>(&self, mut to: W) -> io::Result<Npy<'_, M, W>> {
         self.check_names()?;
         let origin = to.stream_position()?;
@@ -177,10 +179,10 @@ impl<'a, M: StateSpace> Observables<'a, M> {
         Ok(table)
     }
 
-    fn check_names(&self) -> Result<(), TableError> {
+    fn check_names(&self) -> Result<(), ObservablesError> {
         for (index, name) in self.names().enumerate() {
             if self.names().take(index).any(|before| before == name) {
-                return Err(TableError::SameName { name: name.to_owned() });
+                return Err(ObservablesError::SameName { name: name.to_owned() });
             }
         }
         Ok(())

@@ -7,7 +7,7 @@ use crate::run::rounding::rounding;
 use crate::step::digits::Digits;
 
 /// A time at which a run has no state.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unpaired {
     /// The run has ended before, and not at rest, where its last state stands for all later times.
@@ -39,6 +39,8 @@ pub enum Unpaired {
         time: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(Unpaired);
 
 /// How a run has ended, in words.
 fn how(ending: Ending, event: Option<&str>) -> String {

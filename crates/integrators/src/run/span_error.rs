@@ -12,7 +12,7 @@ const fn backwards(is_backwards: bool) -> &'static str {
 }
 
 /// A span that cannot be run.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpanError {
     /// The step size is zero, negative, infinite or NaN.
@@ -192,6 +192,8 @@ pub enum SpanError {
         expected: &'static str,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(SpanError);
 
 /// Accepts a positive, finite step size.
 pub(crate) fn check_step_size(h: f64) -> Result<(), SpanError> {

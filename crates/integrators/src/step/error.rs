@@ -308,8 +308,4 @@ impl StepError {
     }
 }
 
-impl fmt::Debug for StepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(StepError);

@@ -3,7 +3,7 @@
 use metriplectic_manifolds::PointError;
 
 /// Why an [event cannot change the state](crate::Watched::jump).
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JumpError {
     /// The closure returns no point of the space.
@@ -42,3 +42,5 @@ pub enum JumpError {
     )]
     PilesUp,
 }
+
+metriplectic_equations::debug_is_the_sentence!(JumpError);

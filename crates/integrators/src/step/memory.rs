@@ -191,7 +191,7 @@ impl Saved {
 }
 
 /// Numbers of a checkpoint that are not those of a method.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {
     /// A list has another length.
@@ -213,3 +213,5 @@ pub enum RestoreError {
         value: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(RestoreError);

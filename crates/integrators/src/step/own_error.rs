@@ -1,7 +1,6 @@
 //! Faults that only a flow or a method knows of.
 
 use std::error::Error;
-use std::fmt;
 use std::sync::Arc;
 
 /// An error that holds another one, of a type that the library does not know.
@@ -31,11 +30,7 @@ macro_rules! own_error {
             }
         }
 
-        impl fmt::Debug for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                fmt::Display::fmt(self, f)
-            }
-        }
+        metriplectic_equations::debug_is_the_sentence!($name);
     };
 }
 

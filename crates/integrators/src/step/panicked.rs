@@ -6,13 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// A panic in a run of a system as [`FromEquations`](crate::FromEquations), as the flow's own error: in a step or while a state on the way
 /// is verified, with the states before it ([`StepError::Flow`](crate::StepError::Flow)), and elsewhere, while the start is verified or
 /// in the function of an event, without them ([`RunError::Flow`](crate::RunError::Flow)).
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, thiserror::Error)]
 #[error("it has panicked: {message}")]
 #[non_exhaustive]
 pub struct Panicked {
     /// The message of the panic.
     pub message: String,
 }
+
+metriplectic_equations::debug_is_the_sentence!(Panicked);
 
 impl Panicked {
     fn with(payload: &(dyn Any + Send)) -> Self {

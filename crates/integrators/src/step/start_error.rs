@@ -3,7 +3,7 @@
 use super::digits::digits;
 
 /// A state of an open run in which another run cannot start.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
     /// The clock of the state shows another time than that of the start.
@@ -32,3 +32,5 @@ pub enum StartError {
         expected: usize,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(StartError);

@@ -1,13 +1,11 @@
 //! Why a run has no tangent.
 
-use std::fmt;
-
 use crate::run::checkpoint::ResumeError;
 use crate::run::error::RunError;
 use crate::step::{StateSpace, StepError};
 
 /// Why a step has no derivative.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unlinearised {
     /// A path from one end of a step to the other was not found, or a Jacobian is singular or not a number.
@@ -70,6 +68,8 @@ pub enum Unlinearised {
         off: f64,
     },
 }
+
+metriplectic_equations::debug_is_the_sentence!(Unlinearised);
 
 /// A run whose tangent cannot be computed.
 #[derive(thiserror::Error)]
@@ -148,8 +148,4 @@ pub enum TangentError<M: StateSpace> {
     },
 }
 
-impl<M: StateSpace> fmt::Debug for TangentError<M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!([M: StateSpace] TangentError<M>);

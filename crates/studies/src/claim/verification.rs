@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fs, io, path::Path};
 use super::{Claim, Guarantee, page};
 
 /// Why there is no report.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum VerificationError {
     /// The records or the sources cannot be read.
@@ -39,6 +39,8 @@ pub enum VerificationError {
     #[error("no table of the report holds this sentence, which names a test: {0}")]
     Unheld(String),
 }
+
+metriplectic_equations::debug_is_the_sentence!(VerificationError);
 
 /// All claims, and the page that they hold.
 #[derive(Clone, Debug)]

@@ -94,11 +94,7 @@ pub enum ResumeError {
     },
 }
 
-impl std::fmt::Debug for ResumeError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Display::fmt(self, f)
-    }
-}
+metriplectic_equations::debug_is_the_sentence!(ResumeError);
 
 impl From<RestoreError> for ResumeError {
     fn from(error: RestoreError) -> Self {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io::{self, Write};
 
-use super::{BUFFER, Observables, TableError};
+use super::{BUFFER, Observables, ObservablesError};
 use crate::run::state::State;
 use crate::step::StateSpace;
 
@@ -56,7 +56,7 @@ impl<M: StateSpace, W: Write> Csv<'_, M, W> {
         }
         result
             .and(flushed)
-            .map_err(|source| TableError::Write { rows: self.confirmed, source }.into())
+            .map_err(|source| ObservablesError::Write { rows: self.confirmed, source }.into())
     }
 
     /// Writes the rows that are still in memory, and gives back what was written to.

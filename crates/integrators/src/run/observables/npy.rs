@@ -2,7 +2,7 @@
 
 use std::io::{self, Seek, SeekFrom, Write};
 
-use super::{BUFFER, Observables, TableError};
+use super::{BUFFER, Observables, ObservablesError};
 use crate::run::state::State;
 use crate::step::StateSpace;
 
@@ -53,7 +53,7 @@ impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
             to.seek(SeekFrom::End(0))?;
             to.flush()
         };
-        append().map_err(|source| TableError::Write { rows, source })?;
+        append().map_err(|source| ObservablesError::Write { rows, source })?;
         self.bytes.clear();
         self.rows = all;
         Ok(())

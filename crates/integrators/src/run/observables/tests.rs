@@ -139,7 +139,7 @@ impl Seek for Disk {
 fn rows_of(error: &io::Error) -> usize {
     assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{error}");
     match error.get_ref().and_then(|source| source.downcast_ref()) {
-        Some(TableError::Write { rows, .. }) => *rows,
+        Some(ObservablesError::Write { rows, .. }) => *rows,
         other => panic!("{other:?}"),
     }
 }
@@ -244,7 +244,9 @@ fn two_columns_of_one_name_are_refused() {
         for error in [csv, npy] {
             assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
             let source = error.get_ref().and_then(|source| source.downcast_ref());
-            assert!(matches!(source, Some(TableError::SameName { name: other }) if other == name));
+            assert!(
+                matches!(source, Some(ObservablesError::SameName { name: other }) if other == name)
+            );
         }
     }
 }

@@ -89,7 +89,7 @@ pub mod prelude {
     pub use metriplectic_dynamics::{
         AlmostPoisson, AreaForm, Bath, Boltzmann, CasimirDissipation, CometricDissipation, Contact,
         Differentiable, Erase, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu,
-        Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu,
+        Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu, NoDissipation,
         OnsagerDissipation, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
         VectorField, Verify, Zero,
     };

@@ -147,3 +147,50 @@ fn a_run_into_the_edge_of_a_logarithm_ends_there_by_every_method() {
     }
     refuses(&system, &vector![-2.5, 1.0], &["energy", "-2.5", "start where"]);
 }
+
+/// A pendulum beside an entropy at the temperature 300, in a unit of momentum, energy and entropy.
+fn insulated(unit: f64) -> impl Metriplectic<Manifold = Product<Euclidean<2>, Euclidean<1>>> {
+    System::on(Product(Euclidean::<2>, Euclidean::<1>))
+        .bracket((Symplectic, Zero))
+        .energy(move |(x, s): &(Vector2<Real>, Vector1<Real>)| {
+            x.y * x.y * (0.5 / unit) - x.x.cos() * unit + s.x * 300.0
+        })
+        .entropy(|(_, s): &(Vector2<Real>, Vector1<Real>)| s.x)
+        .dissipation(NoDissipation)
+        .build()
+        .expect("it is built")
+}
+
+#[test]
+fn an_entropy_that_nothing_produces_is_a_constant_of_every_method() {
+    for unit in [1.0, 1e-23] {
+        let system = insulated(unit);
+        // A swing, rest below, and a start where the energy is zero.
+        for (q, s) in [(1.5_f64, 0.1), (0.0, 0.1), (0.7, 0.7_f64.cos() / 300.0)] {
+            let start = (vector![q, 0.0], vector![s * unit]);
+            let swing = unit_pendulum(q, 2.0);
+            for method in Any::all(WeylMidpoint) {
+                let run = method.run(&system, start, Span::steps(0.01, 200));
+                let run = run.unwrap_or_else(|error| panic!("{method:?} of {q}: {error}"));
+                let certificate = run.certificate();
+                assert!(certificate.keeps_energy(), "{method:?} of {q}: {certificate}");
+                assert!(certificate.keeps_entropy(), "{method:?} of {q}: {certificate}");
+                let (x, s) = &run.last().point;
+                let moved = (s - start.1).amax(); // by the last digits of the energy, H/300
+                assert!(moved <= 8.0 * f64::EPSILON * start.1.x, "{method:?} of {q}: {moved:e}");
+                assert!((x.x - swing).abs() < 2e-3, "{method:?} of {q}: {} {swing}", x.x);
+            }
+        }
+    }
+}
+
+/// The angle of a pendulum `q'' = −sin q` that starts at rest, after a time: Störmer's rule in small steps.
+fn unit_pendulum(q: f64, time: f64) -> f64 {
+    let (h, mut q, mut p) = (1e-4, q, 0.0);
+    for _ in 0..(time / h).round() as usize {
+        p -= 0.5 * h * q.sin();
+        q += h * p;
+        p -= 0.5 * h * q.sin();
+    }
+    q
+}

@@ -171,7 +171,8 @@ impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     /// Sets the entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
     /// of the bracket unless [`second_law`](Self::second_law) says otherwise. The dissipation of the metric
     /// ([`MetricDissipation`](crate::MetricDissipation)) produces it unless a
-    /// [`dissipation`](Self::dissipation) or a force is given, before or after.
+    /// [`dissipation`](Self::dissipation) or a force is given, before or after. With
+    /// [`NoDissipation`] nothing does, and it is a constant of the motion.
     pub fn entropy<F: ScalarField<M>>(
         self,
         entropy: F,

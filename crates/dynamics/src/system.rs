@@ -101,7 +101,8 @@ where
         }
         let changes = dissipates || is_open || tensors.bracket.is_forced();
         let promises = second_law != SecondLaw::NoEntropy;
-        if promises != (has_entropy && changes) || dissipates && !has_entropy {
+        let needs_entropy = promises || dissipates;
+        if needs_entropy && !has_entropy || has_entropy && changes && !promises {
             return Err(BuildError::SecondLawWithoutEntropy);
         }
         if L::COUNT >= M::Dim::LEN {

@@ -182,6 +182,11 @@ proptest! {
         let at = ChartPoint::<Sphere<2>>::centre(&x);
         let [left, right] = [closure.velocity(&at).unwrap(), area.velocity(&at).unwrap()];
         prop_assert!((left - right).norm() <= 1e-14, "{left} {right}");
+        // A bracket of any kind in other units, also in a product.
+        let scaled = System::on(Sphere::<2>).bracket(Scaled(-2.5, AreaForm)).energy(energy).build().unwrap();
+        laws::bracket(&scaled, &x, &a, &b)?;
+        let left = scaled.velocity(&at).unwrap();
+        prop_assert!((left + right * 2.5).norm() <= 1e-14, "{left} {right}");
         // On SO(3) the body covectors (dS)^ are Nambu's bracket of S = R₁₃, with dS = (R₁₂·, −R₁₁·, 0).
         let slope = |r: &Matrix3<Real>| Vector3::new(-r.m12, r.m11, Real::from(0.0));
         let body = System::on(Rotations)

@@ -29,6 +29,7 @@
 //! | [`AreaForm`](type@crate::dynamics::AreaForm) | on a surface: spins, point vortices | constants only |
 //! | [`Nambu`](crate::dynamics::Nambu) | on a 3-manifold, if only `H`, `S` and a metric are known | `S`, by construction |
 //! | `Nambu::default().and(c)`, once for each further Casimir | the same on an `n`-manifold, `n ≤ 8`, with `n − 3` functions more | `S`, and each `c` |
+//! | `Scaled(c, B)`, of a bracket `B` | for an energy in other units | those of `B` |
 //! | a pair, `(AreaForm, Zero)` | on a product | those of both factors; every function of a factor with `Zero` |
 //! | [`Zero`](crate::dynamics::Zero), **elsewhere** | without reversible motion: `S` rises along a level set of `H` | all functions |
 //!

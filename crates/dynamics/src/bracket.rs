@@ -6,6 +6,7 @@ mod force;
 mod lie_poisson;
 mod nambu;
 mod product;
+mod scaled;
 mod symplectic;
 mod zero;
 

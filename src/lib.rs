@@ -97,7 +97,7 @@ pub mod prelude {
     pub use metriplectic_ensembles::{
         Estimate, FluctuationTheorem, Row, RowStatus, Shard, Sweep, Table, geomspace, linspace,
     };
-    pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
+    pub use metriplectic_fields::{ErasedField, MatrixField, Piecewise, Real, Scalar, ScalarField};
     #[cfg(feature = "fitting")]
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_integrators::{

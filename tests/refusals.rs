@@ -186,8 +186,9 @@ fn an_entropy_that_nothing_produces_is_a_constant_of_every_method() {
 
 /// The angle of a pendulum `q'' = −sin q` that starts at rest, after a time: Störmer's rule in small steps.
 fn unit_pendulum(q: f64, time: f64) -> f64 {
-    let (h, mut q, mut p) = (1e-4, q, 0.0);
-    for _ in 0..(time / h).round() as usize {
+    let (steps, mut q, mut p) = (20_000, q, 0.0);
+    let h = time / f64::from(steps);
+    for _ in 0..steps {
         p -= 0.5 * h * q.sin();
         q += h * p;
         p -= 0.5 * h * q.sin();

@@ -6,6 +6,7 @@
 //! | [`column`](mod@column), [`square`] | [`Column`], [`Square`]: vectors and matrices of a size that the compiler knows |
 //! | [`triangular`] | Cholesky factors of matrices, of a size that is known at run time too |
 //! | [`dimension`] | [`Dimension`]: the size, and the types that have it |
+//! | [`piecewise`] | [`Piecewise`]: the functions with a kink that an `f64` has |
 //! | [`space`] | [`Space`]: points at each scalar, and the chart around a point |
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
 //! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
@@ -36,6 +37,7 @@ pub mod erased;
 pub mod field;
 pub mod laws;
 pub mod newton;
+pub mod piecewise;
 pub mod scalar;
 pub mod series;
 pub mod space;
@@ -49,6 +51,7 @@ pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
 pub use metriplectic_equations::{BrokenLaw, NotPositive};
+pub use piecewise::Piecewise;
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};
 pub use square::{Factors, Square};

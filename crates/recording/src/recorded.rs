@@ -3,6 +3,7 @@
 mod arithmetic;
 mod dual_number;
 mod linear_algebra;
+mod piecewise;
 
 use std::fmt;
 

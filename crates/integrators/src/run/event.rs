@@ -72,6 +72,13 @@ fn name<S: serde::Serializer>(name: &Arc<str>, serializer: S) -> Result<S::Ok, S
     serializer.serialize_str(name)
 }
 
+impl<M: StateSpace> Event<M> {
+    /// The time of the event.
+    pub const fn time(&self) -> f64 {
+        self.state.time
+    }
+}
+
 impl<M: StateSpace> fmt::Display for Event<M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, rises, state, .. } = self;

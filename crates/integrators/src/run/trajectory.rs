@@ -1,5 +1,9 @@
 //! The record of a run.
 
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::path::Path;
+
 use approx::{AbsDiffEq, RelativeEq};
 
 use crate::run::certificate::Certificate;
@@ -34,7 +38,7 @@ impl<M: StateSpace> Trajectory<M> {
     /// ```
     /// # use metriplectic_dynamics::System;
     /// # use metriplectic_fields::Real;
-    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_integrators::{Event, Run, Span, Watch};
     /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
     /// # use nalgebra::Vector3;
     /// # fn main() -> Result<(), metriplectic_integrators::Error> {
@@ -43,7 +47,7 @@ impl<M: StateSpace> Trajectory<M> {
     /// #     .build()?;
     /// let span = Span::steps(0.1, 100).event("node", |p: &Vector3<f64>| p.y);
     /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
-    /// let times: Vec<f64> = run.events().iter().map(|event| event.state.time).collect();
+    /// let times: Vec<f64> = run.events().iter().map(Event::time).collect();
     /// assert!(times.len() > 1 && times.is_sorted());
     /// # Ok(())
     /// # }
@@ -75,6 +79,7 @@ impl<M: StateSpace> Trajectory<M> {
     /// let span = Span::until(10.0).output_at([1.0, 2.0]);
     /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
     /// assert_eq!(run.indices_at(&[2.0, 10.0, 0.0])?, [2, 3, 0]);
+    /// assert_eq!(run.at(2.0)?.time, 2.0);
     /// assert!(run.indices_at(&[3.0]).is_err());
     /// # Ok(())
     /// # }
@@ -86,6 +91,37 @@ impl<M: StateSpace> Trajectory<M> {
     pub fn indices_at(&self, times: &[f64]) -> Result<Vec<usize>, Unpaired> {
         let recorded: Vec<f64> = self.states.iter().map(|state| state.time).collect();
         paired(times, &recorded, (self.ending, self.events.last().map(|event| &event.name)))
+    }
+
+    /// The recorded state at a time, to the rounding of times. Ask for it by [`output_at`](crate::Until::output_at) or
+    /// [`output_every`](crate::Until::output_every): a finished run does not know the states between.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpaired`], as [`indices_at`](Self::indices_at).
+    pub fn at(&self, time: f64) -> Result<&State<M>, Unpaired> {
+        Ok(&self.states[self.indices_at(&[time])?[0]])
+    }
+
+    /// Writes the recorded states as a table of comma-separated values: the time `t`, the entries of the state `x1, x2, …`, the energy
+    /// `H` and the entropy `S`. [`Observables`](crate::Observables) name other columns, and write them while the run goes on.
+    ///
+    /// # Errors
+    ///
+    /// The errors of writing to the file.
+    pub fn csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let mut file = io::BufWriter::new(File::create(path)?);
+        let entries = M::numbers(&self.last().point).len();
+        let names = (1..=entries).map(|k| format!("x{k},")).collect::<String>();
+        writeln!(file, "t,{names}H,S")?;
+        for state in &self.states {
+            write!(file, "{:?}", state.time)?;
+            for x in M::numbers(&state.point) {
+                write!(file, ",{x:?}")?;
+            }
+            writeln!(file, ",{:?},{:?}", state.energy, state.entropy)?;
+        }
+        file.flush()
     }
 
     /// The balance of the run, over all of its steps, recorded or not.

@@ -50,7 +50,7 @@ fn engine(period: f64, steps: usize) -> Result<(Cycle, Certificate), Box<dyn Err
         move |t: Real, _: &Vector1<Real>, w: &Vector1<Real>| {
             let (_, now) = piston(t, period);
             let rate = if now == stroke { w.x.recip() } else { Real::from(0.0) };
-            [Contact { rate, along: vector![1.0.into()] }]
+            [Contact::along(rate, [1.0])]
         }
     };
     let gas = System::on(Euclidean::<1>)

@@ -36,7 +36,7 @@ fn pulled(
         .bath(
             "water",
             Bath::at(1.0).friction(|_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
-                [Contact { rate: FRICTION.into(), along: vector![0.0.into(), 1.0.into()] }]
+                [Contact::along(FRICTION, [0.0, 1.0])]
             }),
         )
         .noise(Boltzmann(1.0))

@@ -4,6 +4,7 @@ use std::fmt;
 
 use metriplectic_fields::{Column, Real, Vector, Velocity};
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian, out_of_chart};
+use nalgebra::SVector;
 
 use super::list::ExchangeArgs;
 use super::{components, vanishes};
@@ -18,7 +19,7 @@ use crate::dissipation::along_velocities;
 /// use num_dual::DualNum;
 /// // Air at 300 K that slows the second entry down, a momentum: R = γ on it.
 /// let air = Bath::at(300.0).friction(|_t: Real, _x: &Vector2<Real>, _w: &Vector2<Real>| {
-///     [Contact { rate: Real::from(0.08), along: Vector2::<Real>::y() }]
+///     [Contact::along(0.08, [0.0, 1.0])]
 /// });
 /// // A room whose temperature changes, and `R = rate · g⁻¹` with the metric of the system.
 /// let room = Bath::in_time(|t| (t * 0.26).sin() * 5.0 + 290.0).isotropic(0.1);
@@ -50,7 +51,9 @@ impl<T> Bath<T, ()> {
         Bath { temperature: self.temperature, friction: Contacts(contacts) }
     }
 
-    /// Sets the friction `R = rate · g⁻¹`, with the metric `g` of the system.
+    /// Sets the friction `R = rate · g⁻¹`, with the metric `g` of the system. It acts along every direction: on SO(3) × R³ it turns
+    /// the attitude towards lower energy as it slows the momenta down. A bath that acts on some directions alone has
+    /// [contacts](Self::friction) along these.
     pub fn isotropic(self, rate: f64) -> Bath<T, Isotropic> {
         Bath { temperature: self.temperature, friction: Isotropic { rate } }
     }
@@ -102,6 +105,13 @@ pub struct Contact<V> {
     pub rate: Real,
     /// The direction.
     pub along: V,
+}
+
+impl<const N: usize> Contact<SVector<Real, N>> {
+    /// A contact of a constant direction.
+    pub fn along(rate: impl Into<Real>, along: [f64; N]) -> Self {
+        Self { rate: rate.into(), along: along.map(Real::from).into() }
+    }
 }
 
 /// The friction `R` of a bath.

@@ -15,7 +15,9 @@ const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let body = System::on(LieDual::so3())
-        .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
+        .energy(|p: &Vector3<Real>| {
+            (p.x * p.x / INERTIA.x + p.y * p.y / INERTIA.y + p.z * p.z / INERTIA.z) * 0.5
+        })
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
         .build()?;
     let start = Vector3::new(0.001, -1.0, 0.001);

@@ -14,11 +14,8 @@
 //! use metriplectic::prelude::*;
 //!
 //! fn main() -> Result<(), Error> {
-//!     let inertia = Vector3::new(10.0, 5.0, 1.0);
 //!     let body = System::on(LieDual::so3())
-//!         .energy(move |p: &Vector3<Real>| {
-//!             p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
-//!         })
+//!         .energy(|p: &Vector3<Real>| (p.x * p.x / 10.0 + p.y * p.y / 5.0 + p.z * p.z) * 0.5)
 //!         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
 //!         .build()?;
 //!     let start = Vector3::new(0.001, -1.0, 0.001);

@@ -194,6 +194,25 @@ docstrings:
         exit 1
     fi
 
+# build the Python package and run its tests, in an environment of its own; what this machine lacks is said and left out
+python:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    work=$(realpath -m "${CARGO_TARGET_DIR:-target}")/python
+    not_tried() { echo "python: not tried, because $1"; exit 0; }
+    python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2> /dev/null || not_tried 'there is no Python 3.10 or newer'
+    python3 -m venv "$work/env" 2> /dev/null || not_tried 'python3 -m venv does not work'
+    "$work/env/bin/pip" install --quiet --disable-pip-version-check \
+        'maturin>=1.9,<2' 'numpy>=1.26' scipy matplotlib pandas tqdm pytest mypy sympy \
+        || not_tried 'its packages cannot be installed'
+    for module in jax dask joblib; do
+        "$work/env/bin/python" -c "import $module" 2> /dev/null || echo "python: without $module, whose tests are left out"
+    done
+    cd python
+    export CARGO_TARGET_DIR=$work/target VIRTUAL_ENV=$work/env PATH="$work/env/bin:$PATH"
+    maturin develop --quiet --profile quick --skip-install
+    python -m pytest -q
+
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")
     cargo deny check
@@ -203,7 +222,7 @@ package:
     cargo publish --workspace --dry-run
 
 # everything a change has to pass; ends on the closing line of `test`
-ci: fmt lint doc test
+ci: fmt lint doc python test
 
 # stop, saying how to install it, where a tool is missing
 [no-exit-message]

@@ -1,7 +1,20 @@
 //! The Python package `metriplectic`: functions that are recorded once, and runs without an interpreter.
 
+mod door;
+#[path = "model_stub.rs"]
+mod model;
+
 use pyo3::prelude::*;
 
 /// The extension module.
 #[pymodule]
-mod _metriplectic {}
+mod _metriplectic {
+    #[pymodule_export]
+    use super::door::derivatives::{evaluate, gradient, pull_back, tangent};
+    #[pymodule_export]
+    use super::door::errors::{Error, ModelError, RunError, SpanError, TraceError};
+    #[pymodule_export]
+    use super::door::fits::least_squares;
+    #[pymodule_export]
+    use super::door::system::RawSystem;
+}

@@ -15,17 +15,18 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Factor:
-    """A space that is no product: its kind, and the shapes of a state and of a covector."""
+    """A space that is no product: its kind, the shapes of the parts of a state, the directions of a chart, and the numbers of a velocity."""
 
     kind: str
-    shape: tuple[int, ...]
+    shapes: tuple[tuple[int, ...], ...]
     directions: int
+    velocities: int
     text: str
     constants: tuple = ()
 
     @property
     def entries(self) -> int:
-        return math.prod(self.shape)
+        return sum(math.prod(shape) for shape in self.shapes)
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,9 @@ class Space:
     entries : int
         The numbers of a state.
     directions : int
-        The numbers of a velocity or a covector.
+        The dimension: the numbers of a displacement in a chart.
+    velocities : int
+        The numbers of a velocity or a covector: those of the ambient space on a sphere, three on SO(3).
     """
 
     factors: tuple[Factor, ...]
@@ -49,6 +52,15 @@ class Space:
     @property
     def directions(self) -> int:
         return sum(factor.directions for factor in self.factors)
+
+    @property
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """The shapes of the parts of a state."""
+        return tuple(shape for factor in self.factors for shape in factor.shapes)
+
+    @property
+    def velocities(self) -> int:
+        return sum(factor.velocities for factor in self.factors)
 
     @property
     def is_vector_space(self) -> bool:
@@ -63,28 +75,28 @@ class Space:
     def shaped(self, x: Any) -> Any:
         """Parts the entries on the last axis: an array of the shape of a state, or a tuple of such for a product."""
         parts, at = [], 0
-        for factor in self.factors:
-            part = x[..., at : at + factor.entries]
-            parts.append(part.reshape(tuple(x.shape[:-1]) + factor.shape))
-            at += factor.entries
+        for shape in self.shapes:
+            size = math.prod(shape)
+            parts.append(x[..., at : at + size].reshape(tuple(x.shape[:-1]) + shape))
+            at += size
         return parts[0] if len(parts) == 1 else tuple(parts)
 
     def flat(self, state: Any) -> np.ndarray:
         """Lists the entries of a state: the inverse of ``shaped`` for one state. A list of all entries stays what it is."""
         parts: Sequence[Any] = (state,)
-        if len(self.factors) > 1 and isinstance(state, (tuple, list)) and len(state) == len(self.factors):
+        if len(self.shapes) > 1 and isinstance(state, (tuple, list)) and len(state) == len(self.shapes):
             if any(np.ndim(part) > 0 for part in state):
                 parts = state
         flat = np.concatenate([np.asarray(part, dtype=float).reshape(-1) for part in parts])
         if flat.size != self.entries:
-            shapes = ", ".join(str(factor.shape) for factor in self.factors)
+            shapes = ", ".join(map(str, self.shapes))
             raise ValueError(f"a state of {self!r} has {self.entries} numbers, of the shape {shapes}; {flat.size} were given")
         return np.ascontiguousarray(flat)
 
 
 def R(n: int) -> Space:
     """The vector space Rⁿ. A state is an array of the shape ``(n,)``."""
-    return Space((Factor("R", (_size(n),), n, f"R({n})"),))
+    return Space((Factor("R", ((_size(n),),), n, n, f"R({n})"),))
 
 
 def lie_dual(constants: Any, name: str = "lie_dual(..)") -> Space:
@@ -99,7 +111,7 @@ def lie_dual(constants: Any, name: str = "lie_dual(..)") -> Space:
     if c.ndim != 3 or len(set(c.shape)) != 1:
         raise ValueError(f"structure constants have the shape (n, n, n), not {c.shape}")
     n = c.shape[0]
-    return Space((Factor("dual", (n,), n, name, tuple(c.ravel().tolist())),))
+    return Space((Factor("dual", ((n,),), n, n, name, tuple(c.ravel().tolist())),))
 
 
 def so3_dual() -> Space:
@@ -116,24 +128,24 @@ def se3_dual() -> Space:
 
 
 def sphere(n: int = 2) -> Space:
-    """The unit sphere Sⁿ in Rⁿ⁺¹. A state has the shape ``(n + 1,)``."""
-    return Space((Factor("sphere", (_size(n) + 1,), n, f"sphere({n})"),))
+    """The unit sphere Sⁿ in Rⁿ⁺¹, n = 1 … 7. A state and a velocity have the shape ``(n + 1,)``."""
+    return Space((Factor("sphere", ((_size(n) + 1,),), n, n + 1, f"sphere({n})"),))
 
 
 def SO3() -> Space:
     """The rotations of space. A state is a matrix of the shape ``(3, 3)``; a covector has three numbers, in the frame of the body."""
-    return Space((Factor("SO3", (3, 3), 3, "SO3()"),))
+    return Space((Factor("SO3", ((3, 3),), 3, 3, "SO3()"),))
 
 
 def half_line() -> Space:
     """The positive numbers, whose steps do not leave them. A state has the shape ``(1,)``."""
-    return Space((Factor("half_line", (1,), 1, "half_line()"),))
+    return Space((Factor("half_line", ((1,),), 1, 1, "half_line()"),))
 
 
 def cotangent_so3() -> Space:
     """T*SO(3): the attitude of a body, a matrix, and its angular momentum in the frame of the body. A state is a tuple of arrays of the
     shapes ``(3, 3)`` and ``(3,)``."""
-    return product(SO3(), R(3))
+    return Space((Factor("cotangent_so3", ((3, 3), (3,)), 6, 6, "cotangent_so3()"),))
 
 
 def product(*spaces: Space) -> Space:

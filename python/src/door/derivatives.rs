@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use metriplectic::dynamics::ModelError as Broken;
 use metriplectic::fields::Real;
-use metriplectic::integrators::tangent::{FlowOf, SmoothFlow};
-use metriplectic::integrators::step::StateSpace;
+use metriplectic::integrators::tangent::SmoothFlow;
 use metriplectic::integrators::{
-    Adjoints as _, AdjointRun, Differentiated, Element, Listed, Schedule, Sensitivity, Stepper, SystemAt,
+    Adjoints as _, Differentiated, Element, Listed, Schedule, Sensitivity, Stepper, SystemAt,
     Systems, TangentRun, Tangents as _,
 };
-use nalgebra::{DMatrix, DVector, SVector};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
+use nalgebra::{DMatrix, SVector};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -87,7 +86,7 @@ struct Tangent {
     t: Vec<f64>,
     y: Vec<f64>,
     entries: usize,
-    /// Rows of the directions, and of the ledger: of each state, along the start and along the parameters.
+    /// The derivatives of the entries, and of the ledger: of each state, along the start and along the parameters.
     along_start: Vec<f64>,
     along_parameters: Vec<f64>,
     ledger: Vec<(String, Vec<f64>, Vec<f64>)>,
@@ -97,13 +96,17 @@ struct Tangent {
     lengths: [usize; 2],
 }
 
-/// Takes the rows of the directions from the matrix of all, along the start and along the parameters.
-fn parts(whole: &DMatrix<f64>, [n, p]: [usize; 2], all: usize) -> [Vec<f64>; 2] {
-    let rows = |columns: std::ops::Range<usize>| {
-        let row = |i: usize| columns.clone().map(move |j| (i, j));
-        (0..n).flat_map(row).map(|at| whole[at]).collect::<Vec<f64>>()
+/// Takes the derivatives of the entries from the matrix of all directions, along the start and along the parameters.
+fn parts<F: Smooth>(flow: &F, x: &Element<F>, whole: &DMatrix<f64>, [n, p]: [usize; 2]) -> [Vec<f64>; 2] {
+    let all = flow.directions();
+    let entries = |columns: std::ops::Range<usize>| {
+        let moved: Vec<Vec<Real>> = columns
+            .map(|j| flow.moving(x, &whole.column(j).rows(0, all).into_owned()))
+            .collect();
+        let rows = moved.first().map_or(0, Vec::len);
+        (0..rows).flat_map(|i| moved.iter().map(move |column| column[i].eps1)).collect::<Vec<f64>>()
     };
-    [rows(0..n), rows(all..all + p)]
+    [entries(0..n), entries(all..all + p)]
 }
 
 impl Tangent {
@@ -141,7 +144,7 @@ impl Tangent {
             tangent.entries = entries.len();
             tangent.y.extend_from_slice(entries);
             let whole = state.matrix();
-            let [start, parameters] = parts(&whole, [n, p], all);
+            let [start, parameters] = parts(flow, &state.point, &whole, [n, p]);
             tangent.along_start.extend(start);
             tangent.along_parameters.extend(parameters);
             if state.point.ledger().is_none() {
@@ -163,7 +166,7 @@ impl Tangent {
             let along = event.time_by(&dg).and_then(|time| Ok((time, event.state_by(&dg)?)));
             let along = match along {
                 Ok((time, state)) => {
-                    let [start, parameters] = parts(&state, [n, p], all);
+                    let [start, parameters] = parts(flow, &event.state.point, &state, [n, p]);
                     let [time_start, time_parameters] =
                         [0..n, all..all + p].map(|columns| columns.map(|j| time[j]).collect());
                     Ok([time_start, time_parameters, start, parameters])
@@ -179,8 +182,8 @@ impl Tangent {
         let (dict, rows, [n, p]) = (PyDict::new(py), self.t.len(), self.lengths);
         dict.set_item("t", self.t.into_pyarray(py))?;
         dict.set_item("y", self.y.into_pyarray(py).reshape([rows, self.entries])?)?;
-        dict.set_item("along_start", self.along_start.into_pyarray(py).reshape([rows, n, n])?)?;
-        let along = self.along_parameters.into_pyarray(py).reshape([rows, n, p])?;
+        dict.set_item("along_start", self.along_start.into_pyarray(py).reshape([rows, self.entries, n])?)?;
+        let along = self.along_parameters.into_pyarray(py).reshape([rows, self.entries, p])?;
         dict.set_item("along_parameters", along)?;
         let ledger = PyDict::new(py);
         for (name, start, parameters) in self.ledger {
@@ -198,8 +201,8 @@ impl Tangent {
                 Ok([time_start, time_parameters, start, parameters]) => {
                     one.set_item("time_along_start", time_start.into_pyarray(py))?;
                     one.set_item("time_along_parameters", time_parameters.into_pyarray(py))?;
-                    one.set_item("along_start", start.into_pyarray(py).reshape([n, n])?)?;
-                    one.set_item("along_parameters", parameters.into_pyarray(py).reshape([n, p])?)?;
+                    one.set_item("along_start", start.into_pyarray(py).reshape([self.entries, n])?)?;
+                    one.set_item("along_parameters", parameters.into_pyarray(py).reshape([self.entries, p])?)?;
                 }
                 Err(message) => one.set_item("error", message)?,
             }
@@ -282,7 +285,7 @@ impl Asked {
         D: Differentiated<AnyMethod, Flow = F>,
     {
         let x0 = self.begin(flow)?;
-        let (n, all) = (directions(flow), flow.directions());
+        let n = directions(flow);
         let schedule = self.schedule.clone();
         let run = self.method.adjoint(system, x0, schedule).map_err(|error| of_tangent(&error))?;
         let output = Output::from_parts((flow, names), run.states(), &[], (run.certificate(), run.ending()));
@@ -294,7 +297,6 @@ impl Asked {
         };
         let pulled = run.gradient(term).map_err(|error| of_tangent(&error))?;
         let start = pulled.along_start();
-        let _ = all;
         Ok(Gradient {
             value,
             along_start: start.rows(0, n).iter().copied().collect(),
@@ -508,4 +510,33 @@ pub(crate) fn evaluate<'py>(
         tape.evaluate(&row.to_vec(), &mut all[k * count..][..count]);
     }
     Ok(all.into_pyarray(py).reshape([rows, count])?)
+}
+
+/// The values of a recorded function at rows of numbers, and their derivatives.
+type Slopes<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+
+/// Evaluates a recorded function and the derivatives of its outputs at rows of numbers.
+#[pyfunction]
+pub(crate) fn jacobian<'py>(
+    py: Python<'py>,
+    program: &Bound<'py, PyAny>,
+    x: PyReadonlyArray2<'_, f64>,
+) -> PyResult<Slopes<'py>> {
+    let (tape, x) = (tape(program)?, x.as_array());
+    if x.ncols() != tape.inputs() {
+        return Err(bad(format!("rows of {} numbers are expected, not of {}", tape.inputs(), x.ncols())));
+    }
+    let [rows, inputs, outputs] = [x.nrows(), x.ncols(), tape.outputs().len()];
+    let (mut values, mut slopes) = (vec![0.0; rows * outputs], vec![0.0; rows * outputs * inputs]);
+    for (k, row) in x.rows().into_iter().enumerate() {
+        let row = row.to_vec();
+        for i in 0..outputs {
+            let mut weights = vec![0.0; outputs];
+            weights[i] = 1.0;
+            let value = &mut values[k * outputs..][..outputs];
+            tape.pull_back(&row, &weights, value, &mut slopes[(k * outputs + i) * inputs..][..inputs]);
+        }
+    }
+    let values = values.into_pyarray(py).reshape([rows, outputs])?;
+    Ok((values, slopes.into_pyarray(py).reshape([rows, outputs, inputs])?))
 }

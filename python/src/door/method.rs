@@ -30,9 +30,9 @@ macro_rules! methods {
             Gauss2: Gauss<2> = "gauss2", "", Gauss;
             Gauss3: Gauss<3> = "gauss3", "", Gauss;
             Gauss4: Gauss<4> = "gauss4", "", Gauss;
-            Radau1: Radau<1> = "radau1", "", Radau;
             Radau2: Radau<2> = "radau2", "", Radau;
             Radau3: Radau<3> = "radau3", "", Radau;
+            Radau4: Radau<4> = "radau4", "", Radau;
             Dp5: DormandPrince5 = "dp5", "", DormandPrince5;
             Dp8: DormandPrince8 = "dp8", "", DormandPrince8;
             Chebyshev: RungeKuttaChebyshev = "chebyshev", "", RungeKuttaChebyshev;

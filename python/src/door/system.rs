@@ -170,11 +170,6 @@ impl RawSystem {
         Ok(Some(surroundings.around(system, &theta.into())))
     }
 
-    /// Refuses derivatives of what has none here.
-    pub(crate) fn is_open(&self) -> bool {
-        self.surroundings.is_some()
-    }
-
     pub(crate) fn ledger_names(&self) -> Option<Names> {
         self.surroundings.as_ref().map(|surroundings| surroundings.names())
     }

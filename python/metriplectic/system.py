@@ -78,10 +78,9 @@ class Definition:
     energy: Program
     entropy: Program | None
     invariants: list[tuple[str, Program]]
-    bracket: tuple[str, Program | None]
+    bracket: tuple[str, Any]
     friction: tuple[str, Program | None]
     metric: Program | None
-    second_law: str
 
 
 @dataclass
@@ -151,11 +150,13 @@ class System:
         Names of parameters with their values, numbers or arrays. ``system(gamma=0.3)`` has other values.
     poisson, almost_poisson : array or function, optional
         The Poisson tensor Π(x), of the shape ``(velocities, velocities)``; ``almost_poisson`` need not satisfy Jacobi's identity.
-        ``"symplectic"`` is the canonical one of positions and momenta, or of T*SO(3); ``"area"`` that of the sphere; ``"none"`` is zero.
-        Without either it is that of the space: Lie-Poisson on the dual of a Lie algebra, and zero elsewhere.
+        ``"symplectic"`` is the canonical one of positions and momenta, or of T*SO(3); ``"area"`` that of the sphere; ``"none"`` is zero;
+        a tuple of such words has one for each factor of a product. Without either it is ``"own"``: that of Lie and Poisson on the dual of
+        a Lie algebra, the canonical one on T*SO(3), and zero elsewhere.
     friction : number, function or None
-        A number scales the dissipation of the metric, 1 without it. A function K(x, w, ..) returns a symmetric matrix with K w = 0, of the
-        shape ``(velocities, velocities)``. None is no friction.
+        A number, or a function κ(x, ..), scales the dissipation of the metric, 1 without it. A function K(x, w, ..) with a second argument
+        returns a symmetric matrix with K w = 0, of the shape ``(velocities, velocities)``, or a list of contacts ``(rate, b)`` with b·w = 0
+        that add up to it. None is no friction.
     metric : array or function, optional
         The matrix g(x) of the metric, of the shape ``(velocities, velocities)``.
     casimirs, momenta : list of functions
@@ -167,8 +168,6 @@ class System:
         of contacts ``(rate, b)`` with ``b`` of the shape ``(velocities,)``.
     noise : float, optional
         Boltzmann's constant k_B, in the unit of the entropy: the friction has its thermal noise.
-    second_law : str
-        ``"exact"``, or ``"published"`` for an entropy that is no Casimir: then the second law is not promised.
 
     Raises
     ------
@@ -202,7 +201,6 @@ class System:
         work: Mapping[str, Function] | None = None,
         baths: Mapping[str, tuple[Any, Function]] | None = None,
         noise: float | None = None,
-        second_law: str = "exact",
     ):
         if not isinstance(space, Space):
             raise TypeError(f"a space such as mp.R(3) is expected first, not {type(space).__name__}")
@@ -224,7 +222,6 @@ class System:
             bracket=self._bracket(poisson, almost_poisson),
             friction=self._friction(friction, entropy),
             metric=None if metric is None else self._matrix(metric, "metric"),
-            second_law=second_law,
         )
         self._ports = [(name, self._record(f, f"port {name}", (n,))) for name, f in (work or {}).items()]
         self._baths = [(name, *self._bath(name, bath)) for name, bath in (baths or {}).items()]
@@ -304,41 +301,69 @@ class System:
             return self._record(lambda x: matrix, name, (n, n))
         return self._record(f, name, (n, n), covector)
 
-    def _bracket(self, poisson: Any, almost: Any) -> tuple[str, Program | None]:
+    def _bracket(self, poisson: Any, almost: Any) -> tuple[str, Any]:
         if almost is not None:
             return "almost", self._matrix(almost, "almost_poisson")
-        if poisson is None:
-            return "own", None
-        if isinstance(poisson, str):
-            if poisson not in ("symplectic", "area", "none"):
-                raise ValueError(f"there is no bracket {poisson!r}; there are 'symplectic', 'area', 'none'")
-            return poisson, None
-        return "poisson", self._matrix(poisson, "poisson")
+        if poisson is None or isinstance(poisson, str):
+            poisson = (poisson or "own",) * len(self.space.factors)
+        if isinstance(poisson, tuple) and all(isinstance(name, str) for name in poisson):
+            for name in poisson:
+                if name not in ("own", "symplectic", "area", "none"):
+                    raise ValueError(f"there is no bracket {name!r}; there are 'own', 'symplectic', 'area', 'none'")
+            if len(poisson) != len(self.space.factors):
+                raise ValueError(f"{len(poisson)} brackets are named, and {self.space!r} has {len(self.space.factors)} factors")
+            return "named", list(poisson)
+        if callable(poisson):
+            return "poisson", self._matrix(poisson, "poisson")
+        n, matrix = self.space.velocities, np.asarray(poisson, dtype=float)
+        if matrix.shape != (n, n):
+            raise ValueError(f"poisson: a matrix of the shape {(n, n)} is expected, not {matrix.shape}")
+        return "constant", [float(x) for x in matrix.ravel()]
 
     def _friction(self, friction: Any, entropy: Any) -> tuple[str, Program | None]:
         if entropy is None or friction is None:
             return "none", None
-        if callable(friction):
-            return "field", self._matrix(friction, "friction", covector=True)
-        number = float(friction)
-        if not (number >= 0.0 and math.isfinite(number)):
-            raise ModelError(f"the friction is {number}; it must be a finite number that is not negative")
-        return ("none", None) if number == 0.0 else ("metric", self._record(lambda x: number + 0.0 * np.sum(x[0]), "friction"))
+        if not callable(friction):
+            number = float(friction)
+            if not (number >= 0.0 and math.isfinite(number)):
+                raise ModelError(f"the friction is {number}; it must be a finite number that is not negative")
+            if number in (0.0, 1.0):
+                return ("metric", None) if number else ("none", None)
+            return "metric", self._record(lambda x: number, "friction")
+        names = _names(friction)
+        if len(names) < 2 or names[1] == "t" or names[1] in self._values:
+            return "metric", self._record(friction, "friction")
+        # A list of contacts, or a matrix: the recording says which.
+        contacts: list[int] = []
+
+        def noted(*arguments, **named):
+            found = friction(*arguments, **named)
+            if not isinstance(found, (list, tuple)):
+                return found
+            contacts.append(len(found))
+            return self._contacts(found, "the friction")
+
+        noted.__signature__ = inspect.signature(friction)  # type: ignore[attr-defined]
+        program, n = self._record(noted, "friction", None, covector=True), self.space.velocities  # type: ignore[arg-type]
+        if contacts:
+            return "contacts", program
+        return "matrix", self._record(friction, "friction", (n, n), covector=True)
+
+    def _contacts(self, found: Any, name: str) -> Any:
+        """Lists the rate and the direction of each contact."""
+        n, numbers = self.space.velocities, []
+        for contact in [found] if isinstance(found, tuple) and len(found) == 2 else found:
+            rate, b = contact
+            if np.shape(b) != (n,):
+                raise ValueError(f"the direction of a contact of {name} has the shape {(n,)}, not {np.shape(b)}")
+            numbers += [rate, *(b[i] for i in range(n))]
+        return array(numbers)
 
     def _bath(self, name: str, bath: Any) -> tuple[Any, Program]:
         temperature, contacts = bath
-        n = self.space.velocities
 
         def listed(*arguments, **named):
-            found = contacts(*arguments, **named)
-            if isinstance(found, tuple) and len(found) == 2:
-                found = [found]
-            numbers = []
-            for rate, b in found:
-                if np.shape(b) != (n,):
-                    raise ValueError(f"the direction of a contact of the bath {name!r} has the shape {(n,)}, not {np.shape(b)}")
-                numbers += [rate, *(b[i] for i in range(n))]
-            return array(numbers)
+            return self._contacts(contacts(*arguments, **named), f"the bath {name!r}")
 
         listed.__signature__ = inspect.signature(contacts)  # type: ignore[attr-defined]
         program = self._record(listed, f"bath {name}", None, covector=True)  # type: ignore[arg-type]
@@ -377,7 +402,7 @@ class System:
         parts = [f"energy: {_size_of(self._definition.energy)}"]
         if self._definition.entropy is not None:
             parts.append(f"entropy: {_size_of(self._definition.entropy)}")
-        if self._definition.friction[1] is not None and self._definition.friction[0] == "field":
+        if self._definition.friction[1] is not None:
             parts.append(f"friction: {_size_of(self._definition.friction[1])}")
         parts += [f"port {name}" for name, _ in self._ports] + [f"bath {name}" for name, *_ in self._baths]
         if self._values:

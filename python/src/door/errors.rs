@@ -40,14 +40,12 @@ create_exception!(
 );
 
 /// Words of Rust, and what a user of Python calls the same.
-const WORDS: [(&str, &str); 40] = [
-    ("or ask for `SecondLaw::Published`", "or set `second_law=\"published\"`"),
-    ("ask for `SecondLaw::Published`", "set `second_law=\"published\"`"),
-    ("`SecondLaw::Published`", "`second_law=\"published\"`"),
+const WORDS: &[(&str, &str)] = &[
+    (", or ask for `SecondLaw::Published`", ""),
+    ("ask for `SecondLaw::Published`, which does not promise the second law, or ", ""),
     ("; say how many with `Span::steps`", "; say how many by `steps=`, or when the run ends by `t=`"),
     ("list it by `.momentum(..)`", "list it in `momenta=`"),
-    ("or ask for `ProjectedDissipation`", "or set `projected=True`"),
-    ("`ProjectedDissipation`", "`projected=True`"),
+    (", or ask for `ProjectedDissipation`", ""),
     ("is `AlmostPoisson::field(..)`", "is given by `almost_poisson=`"),
     ("`AlmostPoisson::field(..)`", "`almost_poisson=`"),
     ("open the system by `.opened()`, which books the work of the time, and answer `Equations::energy_depends_on_time` and `Equations::power`; a closed run asks at the time 0 alone", "give the energy an argument `t`, so that the work of the time is booked"),

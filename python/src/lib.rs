@@ -1,7 +1,6 @@
 //! The Python package `metriplectic`: functions that are recorded once, and runs without an interpreter.
 
 mod door;
-#[path = "model_stub.rs"]
 mod model;
 
 use pyo3::prelude::*;
@@ -10,7 +9,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _metriplectic {
     #[pymodule_export]
-    use super::door::derivatives::{evaluate, gradient, pull_back, tangent};
+    use super::door::derivatives::{evaluate, gradient, jacobian, pull_back, tangent};
     #[pymodule_export]
     use super::door::errors::{Error, ModelError, RunError, SpanError, TraceError};
     #[pymodule_export]

@@ -784,6 +784,8 @@ class _progress:
         self.bar = tqdm(total=self.end - self.start, unit="t", bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} [{elapsed}<{remaining}]")
         return lambda time: self.bar.update(time - self.start - self.bar.n)
 
-    def __exit__(self, *_):
+    def __exit__(self, kind, *_):
         if self.bar is not None:
+            if kind is None:
+                self.bar.update(self.bar.total - self.bar.n)
             self.bar.close()

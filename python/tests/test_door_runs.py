@@ -46,8 +46,9 @@ def test_every_method_reaches_the_reference(method):
         assert len(run) == round(end / h) + 1
         assert run.certificate.keeps_energy and run.certificate.keeps_entropy
         errors.append(np.abs(run.y[-1] - exact).max())
-    # A method of order 2 or more gains a factor of at least 3.4 unless it is at round-off.
-    assert errors[1] < max(errors[0] / 3.4, 1e-12) and errors[0] < 2e-2, errors
+    # A method of order 2 or more gains a factor of at least 3.4 unless it is at round-off; the exponential scheme has order 1.
+    gain = 1.8 if method == "exponential" else 3.4
+    assert errors[1] < max(errors[0] / gain, 1e-12) and errors[0] < 2e-2, errors
 
 
 @pytest.mark.parametrize("gradient", ["gonzalez", "mean-value", "itoh-abe", "symmetric-itoh-abe"])
@@ -178,8 +179,8 @@ def test_progress_calls_a_function_with_rising_times():
 
 
 def test_a_bar_is_shown(capsys):
-    body().run(START, t=2000.0, h=0.01, each=10**6, progress=True)
-    assert "2e+03" in capsys.readouterr().err
+    body().run(START, t=500.0, h=0.01, each=10**6, progress=True)
+    assert "500/500" in capsys.readouterr().err
 
 
 def test_other_threads_go_on_during_a_run():
@@ -204,7 +205,7 @@ def test_runs_from_many_starts_do_not_depend_on_threads():
 
 
 @pytest.mark.parametrize("space, start, energy, entropy, options", [
-    (mp.sphere(2), [0.6, 0.0, 0.8], lambda n: 0.5 * n[0] ** 2 + 0.25 * n[1] ** 2, lambda n: n[2] + 0.0 * n[0], {}),
+    (mp.sphere(2), [0.48, 0.36, -0.8], lambda n: 0.5 * n[0] ** 2 + 0.25 * n[1] ** 2, lambda n: n[2] + 0.3 * n[0] * n[1], {}),
     (mp.half_line() * mp.R(1), [1.0, 0.0], lambda x: x[0][0] + x[1][0], lambda x: np.log(x[0][0]) + 2.0 * np.log(x[1][0] + 3.0), {}),
     (mp.SO3(), np.eye(3), lambda r: r[0, 1] * 0.5 + r[2, 2] ** 2, lambda r: r[0, 0] + 0.3 * r[1, 2], {}),
     (mp.cotangent_so3(), (np.eye(3), [0.9, 0.4, -0.7]), lambda x: 0.5 * x[1] @ (x[1] / INERTIA) + 0.3 * x[0][2, 2], None,

@@ -75,9 +75,10 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
             return ufunc(a.reshape(a.shape + (1,) * b.ndim), b)
         if method == "accumulate" and name in ("add", "multiply"):
             return (np.cumsum if name == "add" else np.cumprod)(*operands, **{"axis": 0, **options})
-        shown = name if method == "__call__" else f"{name}.{method}"
-        raise recording.refusal(f"np.{shown} is not recorded" if not options else f"np.{shown} is not recorded with {list(options)}",
-                                _REMEDIES.get(name, _GENERAL_REMEDY))  # fmt: skip
+        shown = f"np.{name}" if hasattr(np, name) else name
+        shown += "" if method == "__call__" else f".{method}"
+        with_options = f" with {', '.join(options)}" if options else ""
+        raise recording.refusal(f"{shown} is not recorded{with_options}", _REMEDIES.get(name, _GENERAL_REMEDY))
 
     def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
         if function in FUNCTIONS:

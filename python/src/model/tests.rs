@@ -1,0 +1,3 @@
+//! The laws of the library for each space, bracket and friction.
+
+mod laws;

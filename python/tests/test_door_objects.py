@@ -99,17 +99,22 @@ def test_a_row_that_fails_says_why():
     assert "error" in table.rows[1] and "error" not in table.rows[0] and np.isnan(table["y0"][1])
 
 
-def test_the_types_are_those_of_the_stubs():
+def test_the_types_are_those_of_the_stubs(tmp_path):
     pytest.importorskip("mypy")
     package = Path(mp.__file__).parent
     assert (package / "py.typed").exists()
-    program = "import metriplectic as mp\nrun = mp.System(mp.R(2), energy=lambda x: x @ x).run([1.0, 0.0], t=1.0)\nreveal_type(run.y)\n"
-    done = subprocess.run([sys.executable, "-m", "mypy", "-p", "metriplectic", "--ignore-missing-imports"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
-    checked = subprocess.run([sys.executable, "-m", "mypy", "-c", program], capture_output=True, text=True)
-    assert checked.returncode == 0 and "ndarray" in checked.stdout, checked.stdout
-    wrong = subprocess.run([sys.executable, "-m", "mypy", "-c", "import metriplectic as mp\nmp.R('3')\n"], capture_output=True, text=True)
-    assert wrong.returncode == 1 and "incompatible type" in wrong.stdout
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import metriplectic as mp\n"
+        "run = mp.System(mp.R(2), energy=lambda x: x @ x).run([1.0, 0.0], t=1.0)\n"
+        "reveal_type(run.y)\n"
+        "mp.R('3')\n"
+    )
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--ignore-missing-imports", str(package), str(program)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    errors = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert len(errors) == 1 and "program.py:4" in errors[0] and "incompatible type" in errors[0], done.stdout
+    assert "ndarray" in done.stdout
 
 
 def test_the_examples_of_the_docstrings_hold():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 import warnings
 from typing import Any, Callable
@@ -32,7 +33,7 @@ UNARY = (
     "negative reciprocal sqrt cbrt exp exp2 expm1 log log2 log10 log1p sin cos tan arcsin arccos arctan sinh cosh tanh arcsinh arccosh"
     " arctanh absolute fabs sign square positive deg2rad rad2deg radians degrees conjugate"
 ).split()
-BINARY = "add subtract multiply divide power arctan2 hypot minimum maximum fmin fmax logaddexp heaviside float_power".split()
+BINARY = "add subtract multiply divide power arctan2 hypot minimum maximum fmin fmax logaddexp heaviside".split()
 COMPARISONS = "less less_equal equal greater greater_equal not_equal logical_and logical_or logical_xor".split()
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 3.0, 1e300, 1e-300, np.inf, -np.inf, np.nan]
 
@@ -54,14 +55,14 @@ def test_a_function_of_two_arrays_has_the_numbers_of_numpy(name: str) -> None:
     f = getattr(np, name)
     a, b = (x.ravel() for x in np.meshgrid(SPECIAL, SPECIAL))
     if name in ("hypot", "logaddexp"):  # The squares of large numbers overflow, and equal infinities have no difference.
-        usual = (np.abs(a) < 1e100) & (np.abs(b) < 1e100)
+        usual = ~(np.isin(np.abs(a), [1e300, 1e-300, np.inf]) | np.isin(np.abs(b), [1e300, 1e-300, np.inf]))
         a, b = a[usual], b[usual]
     n = len(a)
     number = (lambda c: np.where(c, 1.0, 0.0)) if name in COMPARISONS else (lambda c: c)
     got, want = recorded(lambda x: number(f(x[:n], x[n:])), np.concatenate([a, b]))
     np.testing.assert_allclose(got, want, rtol=1e-14)
     for k, value in enumerate(SPECIAL):  # A constant on either side, which is the operand of an instruction.
-        if name in ("hypot", "logaddexp") and not abs(value) < 1e100:
+        if name in ("hypot", "logaddexp") and abs(value) in (1e300, 1e-300, np.inf):
             continue
         x = np.unique(a)
         for one in (lambda x: number(f(x, value)), lambda x: number(f(value, x))):
@@ -118,7 +119,7 @@ CALLS: list[Callable[..., Any]] = [
     lambda x: x[::-1, 1:], lambda x: x[:, [2, 1]], lambda x: x[1, 2], lambda x: x.flat, lambda x: list(x.flat), lambda x: [list(row) for row in x], lambda x: [[1, x[0, 0]], [x[1, 1], 2]],
     lambda x: np.full_like(x, 2.0) * x, lambda x: np.ones_like(x[0]) + x, lambda x: np.full_like(x, x[0, 0]), lambda x: np.eye(2, like=x) @ x, lambda x: np.full((2, 3), 0.5, like=x) * x,
     lambda x: np.ones((2, 2), like=x) @ x, lambda x: np.array([x[0, 0], 2.0], like=x), lambda x: np.identity(2, like=x) @ x, lambda x: x.astype(float), lambda x: np.copy(x), lambda x: +x,
-    lambda x: np.array([x[0, 0], x[1, 1]]) ** 2, lambda x: np.exp(np.array([[x[0, 0], 0.0], [1, x[1, 1]]])), lambda x: np.array([x[0], x[1]]) @ SPARSE, lambda x: np.array(x) + 1,
+    lambda x: np.array([x[0, 0], x[1, 1]]) ** 2, lambda x: np.exp(np.array([[x[0, 0], x[0, 1]], [x[1, 0], x[1, 1]]])), lambda x: np.array([x[0, 0], x[1, 1]]).std(), lambda x: np.array([x[0], x[1]]) @ SPARSE, lambda x: np.array(x) + 1,
     lambda x: np.linalg.norm(np.array([x[0, 0], x[1, 1]])), lambda x: np.array([x[0, 0], x[1, 1]]).mean(), lambda x: np.arctan2(np.array([x[0, 0]]), 2.0), lambda x: np.sqrt(np.asarray(x) ** 2),
     lambda x: np.cross(np.array([x[0, 0], 0, 1]), [1, 2, 3]), lambda x: np.outer(np.array([x[0, 0], 2]), x[1]), lambda x: x.real + x.imag, lambda x: np.real(x), lambda x: divmod(1, 2)[1] * x,
     lambda x: -x, lambda x: 3 - x, lambda x: 2 / x, lambda x: [1.0, 2, 3] * x, lambda x: np.float64(2) * x[0, 0], lambda x: np.float32(2) ** x, lambda x: x[0, 0] ** x[0, 2], lambda x: 2 ** x[0, 0],
@@ -168,12 +169,10 @@ def test_linear_algebra_of_small_matrices(n: int) -> None:
 def test_a_long_sum_has_the_round_off_of_numpy() -> None:
     x = np.random.default_rng(0).normal(size=100_000) * 1e3 + 1e6
     program = tracing.trace(np.sum, [x.shape])
-    import math
-
     assert abs(program.evaluate(x.tolist())[0] - math.fsum(x)) < 1e-14 * math.fsum(np.abs(x))
     for n in (127, 128, 129, 256, 300, 16_385):
         program = tracing.trace(lambda x: np.stack([x, -2 * x]).sum(axis=1), [(n,)], (2,))
-        assert len(program.ops) == n + 2 * (n - 1)
+        assert np.count_nonzero(program.ops != Op.LITERAL) == n + 2 * (n - 1)
         assert program.evaluate(range(n)) == [n * (n - 1) / 2, -float(n * (n - 1))]
         assert tracing.trace(np.cumsum, [(n,)], (n,)).evaluate([1.0] * n) == list(range(1, n + 1))
 
@@ -207,6 +206,7 @@ def test_the_zeros_of_a_matrix_of_numbers_cost_nothing() -> None:
         lambda x: x.tobytes(), lambda x: np.array_equal(x, x), lambda x: np.allclose(x, 1), lambda x: np.unique(x), lambda x: np.linalg.inv(x),
         lambda x: np.max(np.array([x[0, 0], x[1, 1]])), lambda x: np.array([x[0, 0], 1]) > 0, lambda x: np.sign(np.array([x[0, 0]])),
         lambda x: np.array([x[0, 0], 1]).astype(float), lambda x: np.asarray(x, dtype=float), lambda x: __import__("pickle").dumps(x),
+        lambda x: np.exp(np.array([x[0, 0], 1.0])), lambda x: np.linalg.det(np.array([[x[0, 0]]])),
         lambda x: 1 if x[0, 0] else 2, lambda x: not x[0, 0], lambda x: x[0, 0] and 1, lambda x: 0 < x[0, 0] < 1, lambda x: int(x.sum()),
         lambda x: x[0, 0].is_integer(), lambda x: float(np.array([x[0, 0]])[0]), lambda x: (x[0, 0] + 1j).real, lambda x: np.frompyfunc(abs, 1, 1)(x),
     ],

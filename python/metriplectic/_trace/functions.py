@@ -8,11 +8,10 @@ from typing import Any, Callable
 
 import numpy as np
 
-from . import linear
+from . import linear, ufuncs  # noqa: F401  ufuncs fills its tables
 from .operations import Op
 from .recording import Recording
 from .symbols import FUNCTIONS, REDUCTIONS, UFUNCS, SymbolArray, Symbolic, SymbolNumber, computed, lift, moved, symbol
-from .ufuncs import select
 
 
 def _enter(names: str, record: Callable[..., Any]) -> None:
@@ -20,7 +19,10 @@ def _enter(names: str, record: Callable[..., Any]) -> None:
     signature = inspect.signature(record)
 
     def checked(recording: Recording, *arguments: Any, **options: Any) -> Any:
-        given = {key: value for key, value in options.items() if value is not np._NoValue and not (key == "out" and value is None)}
+        given = {key: value for key, value in options.items() if value is not np._NoValue}
+        for name in ("out", "device"):
+            if given.get(name, 0) is None:
+                del given[name]
         if "dtype" in given and given["dtype"] in (None, float, np.dtype(np.float64)):
             del given["dtype"]
         try:
@@ -178,7 +180,7 @@ _enter("zeros_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.
 _enter("ones_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, 1.0))
 _enter("empty_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, np.nan))
 _enter("full_like", lambda r, a, v, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, v))
-_enter("eye", lambda r, N, M=None, k=0: _new(r, (N, N if M is None else M), np.eye(N, M, k)))
+_enter("eye", lambda r, N, M=None, k=0, order="C": _new(r, (N, N if M is None else M), np.eye(N, M, k)))
 _enter("identity", lambda r, n: _new(r, (n, n), np.eye(n)))
 _enter("array asarray", lambda r, object, copy=True: _copied(r, object))
 
@@ -197,7 +199,7 @@ FUNCTIONS[np.iscomplexobj] = lambda r, x: False
 FUNCTIONS[np.isrealobj] = lambda r, x: True
 FUNCTIONS[np.real] = lambda r, val: val
 FUNCTIONS[np.imag] = lambda r, val: val.imag
-FUNCTIONS[np.result_type] = lambda r, *operands: np.result_type(*(x.dtype if isinstance(x, Symbolic) else x for x in operands))
+FUNCTIONS[np.result_type] = lambda r, *operands: np.result_type(*(float if isinstance(x, Symbolic) else x for x in operands))
 
 
 # Sums, products and what is made of them.
@@ -319,7 +321,7 @@ def _chosen(recording: Recording, condition: Any, x: Any, y: Any) -> Any:
     if not isinstance(condition, Symbolic) and np.asarray(condition).dtype != object:
         ids = np.where(condition, yes, no)
     else:
-        ids = select(recording, lift(recording, condition)[0], yes, no)
+        ids = recording.put_all(Op.SELECT, lift(recording, condition)[0], yes, no)
     return computed(recording, ids, is_yes and is_no)
 
 

@@ -8,6 +8,7 @@ from typing import Any, Callable, Sequence
 
 import numpy as np
 
+from . import functions  # noqa: F401  It fills the tables of what NumPy's functions record.
 from .errors import TraceError
 from .places import call, place_of
 from .program import Program
@@ -15,9 +16,6 @@ from .recording import Recording, Registers
 from .symbols import SymbolArray, Symbolic, SymbolNumber, lift
 
 Function = Callable[..., Any]
-
-# The tables of what NumPy's functions record are filled by these modules.
-from . import functions, ufuncs  # noqa: E402, F401  isort: skip
 
 
 def trace(f: Function, inputs: Sequence[tuple[int, ...]], out: tuple[int, ...] | None = (), name: str = "function") -> Program:

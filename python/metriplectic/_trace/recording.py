@@ -17,6 +17,7 @@ from .program import Program
 Registers = NDArray[np.int64]
 """An array of register numbers."""
 
+_LITERAL, _SUBTRACTION = Op.LITERAL, Op.SUBTRACTION  # Members of an enumeration are slow to find.
 _INPUT = 255
 """The mark of a register that is an input."""
 
@@ -27,6 +28,9 @@ _CONSTANT_FORMS = {
     Op.MULTIPLICATION: (Op.SCALE, Op.SCALE),
     Op.DIVISION: (Op.DIV_CONSTANT, Op.CONSTANT_DIV),
 }
+_FEW = 64
+"""The number of constants beyond which an array of them is not looked up among those that are there."""
+
 _BLOCK = 128
 """The longest sum that is formed term by term; longer ones are sums of such sums, as in NumPy, for the sake of round-off."""
 
@@ -34,7 +38,7 @@ _BLOCK = 128
 class Recording:
     """The instructions of one call of a function.
 
-    Constants are registers too, one for each bit pattern; arithmetic with a constant becomes the operation that holds it. Equal
+    Constants are registers too; arithmetic with a constant becomes the operation that holds it. Equal
     instructions, operations on constants alone and dead code are left to the simplification of tapes in Rust.
 
     Parameters
@@ -45,7 +49,7 @@ class Recording:
         The number of inputs.
     """
 
-    __slots__ = ("_constants", "_literals", "_operands", "_ops", "_values", "converted", "inputs", "name", "refused")
+    __slots__ = ("_constants", "_literals", "_operands", "_ops", "converted", "inputs", "name", "refused")
 
     def __init__(self, name: str, inputs: int) -> None:
         if inputs > MOST_REGISTERS:
@@ -55,7 +59,6 @@ class Recording:
         self._operands = numbers("I", bytes(12 * inputs))
         self._constants = numbers("d", bytes(8 * inputs))
         self._literals: dict[Any, int] = {}
-        self._values: dict[int, float] = {}
         self.refused: str | None = None
         """The first refusal, which a user's `except` must not hide."""
         self.converted: str | None = None
@@ -96,33 +99,42 @@ class Recording:
         if register is None:
             register = self.put(Op.LITERAL, k=value)
             self._literals[key] = register
-            self._values[register] = value
         return register
 
     def arithmetic_of_two(self, op: Op, a: int, b: int) -> int:
         """Adds a sum, difference, product or quotient of two registers."""
         right, left = _CONSTANT_FORMS[op]
-        value = self._values.get(b)
-        if value is not None:
-            return self.put(right, a, k=-value if op is Op.SUBTRACTION else value)
-        value = self._values.get(a)
-        return self.put(op, a, b) if value is None else self.put(left, b, k=value)
+        if self._ops[b] == _LITERAL:
+            value = self._constants[b]
+            return self.put(right, a, k=-value if op is _SUBTRACTION else value)
+        if self._ops[a] == _LITERAL:
+            return self.put(left, b, k=self._constants[a])
+        return self.put(op, a, b)
+
+    def power_of_one(self, a: int, exponent: float) -> int:
+        """Adds a power of a register, with a constant exponent: a square root for 1/2, ``Op.POWI`` for a small integer."""
+        if exponent == 0.5:
+            return self.put(Op.SQRT, a)
+        # Adding 0 makes 0 of −0, which is no integer for a tape.
+        is_small_integer = abs(exponent) <= MOST_EXPONENT and exponent.is_integer()
+        return self.put(Op.POWI if is_small_integer else Op.POWF, a, k=exponent + 0.0)
 
     # Many instructions at once, on arrays of registers that broadcast.
 
     def put_all(self, op: Any, a: Registers, b: Any = 0, c: Any = 0, k: Any = 0.0) -> Registers:
-        """Adds an instruction for each entry of ``a`` and returns their registers in its shape.
+        """Adds an instruction for each entry of operands that broadcast, and returns their registers in this shape.
 
-        ``op``, ``b``, ``c`` and ``k`` are numbers, or arrays of this shape.
+        ``op`` and ``k`` are numbers, or arrays that broadcast to it.
         """
-        first, count = len(self._ops), a.size
+        shape = np.broadcast(a, b, c).shape
+        first, count = len(self._ops), math.prod(shape)
         self._check_room(count)
-        operands = np.empty((*a.shape, 3), np.uint32)
+        operands = np.empty((*shape, 3), np.uint32)
         operands[..., 0], operands[..., 1], operands[..., 2] = a, b, c
-        self._ops.frombytes(np.broadcast_to(np.asarray(op, np.uint8), a.shape).tobytes())
+        self._ops.frombytes(np.broadcast_to(np.asarray(op, np.uint8), shape).tobytes())
         self._operands.frombytes(operands.tobytes())
-        self._constants.frombytes(np.broadcast_to(np.asarray(k, np.float64), a.shape).tobytes())
-        return np.arange(first, first + count).reshape(a.shape)
+        self._constants.frombytes(np.broadcast_to(np.asarray(k, np.float64), shape).tobytes())
+        return np.arange(first, first + count).reshape(shape)
 
     def constants(self, values: Any) -> Registers:
         """Returns the registers of an array of constants, in its shape."""
@@ -130,7 +142,11 @@ class Recording:
         if array.size == 1:
             return np.full(array.shape, self.constant(float(array.reshape(-1)[0])))
         bits, places = np.unique(np.ascontiguousarray(array).view(np.int64).ravel(), return_inverse=True)
-        registers = np.array([self.constant(value) for value in bits.view(np.float64).tolist()], np.int64)
+        values = bits.view(np.float64)
+        if values.size > _FEW:
+            registers = self.put_all(Op.LITERAL, np.zeros(values.shape, np.int64), k=values)
+        else:
+            registers = np.array([self.constant(value) for value in values.tolist()], np.int64)
         return registers[places.reshape(-1)].reshape(array.shape)
 
     def known(self, registers: Registers) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
@@ -142,6 +158,7 @@ class Recording:
     def arithmetic(self, op: Op, a: Registers, b: Registers) -> Registers:
         """Adds sums, differences, products or quotients entry by entry."""
         a, b = np.broadcast_arrays(a, b)
+        self._check_room(a.size)
         is_a, value_a = self.known(a)
         is_b, value_b = self.known(b)
         if not (is_a.any() or is_b.any()):
@@ -153,13 +170,12 @@ class Recording:
         return self.put_all(ops, np.where(is_a, b, a), np.where(is_a | is_b, 0, b), k=k)
 
     def power(self, a: Registers, b: Registers) -> Registers:
-        """Adds powers entry by entry: a square root for the constant exponent 1/2, ``Op.POWI`` for a small integer."""
+        """Adds powers entry by entry, as ``power_of_one`` where the exponent is a constant."""
         a, b = np.broadcast_arrays(a, b)
         is_known, k = self.known(b)
         is_root = is_known & (k == 0.5)
         is_small_integer = is_known & (np.abs(k) <= MOST_EXPONENT) & (k == np.round(k))
         ops = np.select([is_root, is_small_integer, is_known], [Op.SQRT, Op.POWI, Op.POWF], Op.POWER)
-        # Adding 0 makes 0 of −0, which is no integer for a tape.
         return self.put_all(ops, a, np.where(is_known, 0, b), k=np.where(is_root, 0.0, k + 0.0))
 
     def total(self, op: Op, terms: Registers, neutral: float, keep: NDArray[np.bool_] | None = None) -> Registers:
@@ -221,6 +237,7 @@ class Recording:
         entries. It differs from NumPy's only where the other factor is infinite or not a number.
         """
         a, b = np.broadcast_arrays(a, b)
+        self._check_room(a.size)
         (is_a, value_a), (is_b, value_b) = self.known(a), self.known(b)
         is_zero = (is_a & (value_a == 0.0) & np.isfinite(value_b)) | (is_b & (value_b == 0.0) & np.isfinite(value_a))
         keep = ~is_zero

@@ -42,10 +42,6 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
         raise NotImplementedError
 
     @property
-    def dtype(self) -> np.dtype[Any]:
-        return np.dtype(np.bool_ if self.is_condition else np.float64)
-
-    @property
     def real(self) -> Symbolic:
         return self
 
@@ -229,9 +225,10 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
         return moved(self, self.ids.copy(order))
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
-        if np.dtype(dtype) not in (np.dtype(np.float64), self.dtype):
+        to_condition = self.is_condition and np.dtype(dtype) == np.bool_
+        if np.dtype(dtype) != np.float64 and not to_condition:
             raise self.recording.refusal(f"the state is turned into numbers of the type {np.dtype(dtype)}", "leave .astype(..) out")
-        return computed(self.recording, self.ids.copy(), self.is_condition and np.dtype(dtype) == np.bool_)
+        return computed(self.recording, self.ids.copy(), to_condition)
 
     def sum(self, *arguments: Any, **options: Any) -> Any:
         return np.sum(self, *arguments, **options)
@@ -288,6 +285,11 @@ class SymbolArray(Symbolic):
     def ids(self) -> Registers:
         return self._ids
 
+    # An entry has no `dtype`: NumPy's mean of an array of objects would ask for a number of this type.
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        return np.dtype(np.bool_ if self.is_condition else np.float64)
+
     def __repr__(self) -> str:
         return f"SymbolArray(shape={self.shape})"
 
@@ -314,7 +316,7 @@ class SymbolArray(Symbolic):
             condition = symbol(recording, key)
             if not condition.is_condition or condition.shape != self.shape or ids.ndim:
                 raise recording.refusal("an index depends on the state", "use np.where(condition, a, b)")
-            ids = recording.put_all(Op.SELECT, condition.ids, np.broadcast_to(ids, self.shape), self._ids)
+            ids = recording.put_all(Op.SELECT, condition.ids, ids, self._ids)
             key = ...
         self._ids[key] = ids
 
@@ -327,6 +329,10 @@ class SymbolArray(Symbolic):
 
     def fill(self, value: Any) -> None:
         self[...] = value
+
+
+# Looked up once: members of an enumeration are slow to find.
+_ADD, _SUB, _MUL, _DIV = Op.ADDITION, Op.SUBTRACTION, Op.MULTIPLICATION, Op.DIVISION
 
 
 class SymbolNumber(Symbolic):
@@ -376,28 +382,33 @@ class SymbolNumber(Symbolic):
         return SymbolNumber(self.recording, self.recording.arithmetic_of_two(op, register, self.id))
 
     def __add__(self, other: Any) -> Any:
-        return self._with(Op.ADDITION, np.add, other)
+        return self._with(_ADD, np.add, other)
 
     def __radd__(self, other: Any) -> Any:
-        return self._after(Op.ADDITION, np.add, other)
+        return self._after(_ADD, np.add, other)
 
     def __sub__(self, other: Any) -> Any:
-        return self._with(Op.SUBTRACTION, np.subtract, other)
+        return self._with(_SUB, np.subtract, other)
 
     def __rsub__(self, other: Any) -> Any:
-        return self._after(Op.SUBTRACTION, np.subtract, other)
+        return self._after(_SUB, np.subtract, other)
 
     def __mul__(self, other: Any) -> Any:
-        return self._with(Op.MULTIPLICATION, np.multiply, other)
+        return self._with(_MUL, np.multiply, other)
 
     def __rmul__(self, other: Any) -> Any:
-        return self._after(Op.MULTIPLICATION, np.multiply, other)
+        return self._after(_MUL, np.multiply, other)
 
     def __truediv__(self, other: Any) -> Any:
-        return self._with(Op.DIVISION, np.true_divide, other)
+        return self._with(_DIV, np.true_divide, other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return self._after(Op.DIVISION, np.true_divide, other)
+        return self._after(_DIV, np.true_divide, other)
+
+    def __pow__(self, other: Any) -> Any:
+        if self.is_condition or type(other) not in (int, float):
+            return np.power(self, other)
+        return SymbolNumber(self.recording, self.recording.power_of_one(self.id, float(other)))
 
     __iadd__, __isub__, __imul__, __itruediv__ = __add__, __sub__, __mul__, __truediv__
 
@@ -510,6 +521,7 @@ _BRANCHES = [
     (r"^assert\b", "leave the assertion out: a recorded function cannot check the state"),
     (r"^while\b|\biter\(", "write a loop with a fixed number of rounds, and np.where for what depends on the state"),
     (r"(?<![\w.])(max|min)\(", "write np.maximum(a, b) or np.minimum(a, b) for max and min"),
+    (r"\blogical_(and|or)\.reduce\(", "write nested np.where(..), or nested Piecewise(..) in SymPy, for conditions joined by and, or"),
     (r"(?<![\w.])sorted\(", "write the function without an order of the entries"),
     (r"\b(any|all)\(|\bnp\.(isclose|allclose|array_equal)\(", _BRANCH_REMEDY),
 ]  # fmt: skip

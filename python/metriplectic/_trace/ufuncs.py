@@ -30,7 +30,11 @@ def _elementwise(name: str, rule: _Rule, *, to_condition: bool = False, of_condi
         if not are_conditions and of_conditions == "only":
             remedy = "write np.where, or comparisons on both sides: (a > 0) & (b > 0)"
             raise recording.refusal(f"np.{name} is called with numbers, and takes conditions", remedy)
-        ids = np.broadcast_arrays(*(ids for ids, _ in lifted))
+        try:
+            ids = np.broadcast_arrays(*(ids for ids, _ in lifted))
+        except ValueError:
+            shapes = " and ".join(str(ids.shape) for ids, _ in lifted)
+            raise recording.refusal(f"the shapes {shapes} do not fit in np.{name}", "compare the shapes") from None
         is_condition = to_condition or (are_conditions and of_conditions in ("condition", "only"))
         chosen = _OF_CONDITIONS.get(name, rule) if are_conditions else rule
         return computed(recording, chosen(recording, *ids), is_condition)
@@ -58,12 +62,6 @@ def _swapped(rule: _Rule) -> _Rule:
     return lambda r, a, b: rule(r, b, a)
 
 
-def select(r: Recording, condition: Registers, yes: Registers, no: Registers) -> Registers:
-    """Adds a choice between registers that broadcast."""
-    condition, yes, no = np.broadcast_arrays(condition, yes, no)
-    return r.put_all(Op.SELECT, condition, yes, no)
-
-
 def _extremum(op: Op) -> _Rule:
     """The larger or smaller of two numbers, and not a number if one of them is none, as in NumPy.
 
@@ -80,7 +78,7 @@ def _extremum(op: Op) -> _Rule:
             return result
         result = np.array(result)
         x, y = b[~is_number], result[~is_number]
-        result[~is_number] = select(r, r.put_all(Op.EQUAL, x, x), y, x)
+        result[~is_number] = r.put_all(Op.SELECT, r.put_all(Op.EQUAL, x, x), y, x)
         return result
 
     return rule
@@ -88,13 +86,13 @@ def _extremum(op: Op) -> _Rule:
 
 def _lenient_extremum(op: Op) -> _Rule:
     """The larger or smaller of two numbers, and the other one if one of them is not a number."""
-    return lambda r, a, b: select(r, r.put_all(Op.EQUAL, a, a), r.put_all(op, a, b), b)
+    return lambda r, a, b: r.put_all(Op.SELECT, r.put_all(Op.EQUAL, a, a), r.put_all(op, a, b), b)
 
 
 def _sign(r: Recording, a: Registers) -> Registers:
     """The sign, 0 for 0; that of tapes is ±1 there."""
     zero = r.constants(0.0)
-    return select(r, r.put_all(Op.EQUAL, a, zero), zero, r.put_all(Op.SIGN, a))
+    return r.put_all(Op.SELECT, r.put_all(Op.EQUAL, a, zero), zero, r.put_all(Op.SIGN, a))
 
 
 def _power(r: Recording, a: Registers, b: Registers) -> Registers:
@@ -106,6 +104,7 @@ def _square(r: Recording, a: Registers) -> Registers:
 
 
 def _hypot(r: Recording, a: Registers, b: Registers) -> Registers:
+    # The squares are not scaled: those of numbers beyond 1e±150 leave the range of floats, as in `np.sqrt(a * a + b * b)`.
     return r.put_all(Op.SQRT, r.arithmetic(Op.ADDITION, _square(r, a), _square(r, b)))
 
 
@@ -117,9 +116,9 @@ def _logaddexp(r: Recording, a: Registers, b: Registers) -> Registers:
 
 def _heaviside(r: Recording, a: Registers, b: Registers) -> Registers:
     zero, one = r.constants(0.0), r.constants(1.0)
-    above = select(r, r.put_all(Op.LESS, zero, a), one, a)
-    below = select(r, r.put_all(Op.LESS, a, zero), zero, above)
-    return select(r, r.put_all(Op.EQUAL, a, zero), b, below)
+    above = r.put_all(Op.SELECT, r.put_all(Op.LESS, zero, a), one, a)
+    below = r.put_all(Op.SELECT, r.put_all(Op.LESS, a, zero), zero, above)
+    return r.put_all(Op.SELECT, r.put_all(Op.EQUAL, a, zero), b, below)
 
 
 def _scaled(rule: _Rule, op: Op, factor: float) -> _Rule:
@@ -143,8 +142,7 @@ for _name, _op in {"subtract": Op.SUBTRACTION, "divide": Op.DIVISION}.items():
     _elementwise(_name, _arithmetic(_op), of_conditions="refuse" if _name == "subtract" else "number")
 for _name, _op in {"add": Op.ADDITION, "multiply": Op.MULTIPLICATION}.items():
     _elementwise(_name, _arithmetic(_op), of_conditions="condition")
-for _name in ("power", "float_power"):
-    _elementwise(_name, _power)
+_elementwise("power", _power)
 for _name, _rule in {
     "less": _two(Op.LESS), "less_equal": _two(Op.LESS_EQUAL), "equal": _two(Op.EQUAL),
     "greater": _swapped(_two(Op.LESS)), "greater_equal": _swapped(_two(Op.LESS_EQUAL)), "not_equal": _not(_two(Op.EQUAL)),

@@ -223,6 +223,8 @@ class System:
             friction=self._friction(friction, entropy),
             metric=None if metric is None else self._matrix(metric, "metric"),
         )
+        if (work or baths) and space.velocities != space.directions:
+            raise ModelError("ports and baths are not on spheres: a velocity of theirs has no numbers in a chart there; leave them out")
         self._ports = [(name, self._record(f, f"port {name}", (n,))) for name, f in (work or {}).items()]
         self._baths = [(name, *self._bath(name, bath)) for name, bath in (baths or {}).items()]
         self._build()

@@ -1,7 +1,7 @@
 //! The Python package `metriplectic`: functions that are recorded once, and runs without an interpreter.
 
 mod door;
-mod model;
+pub mod model;
 
 use pyo3::prelude::*;
 

@@ -1,5 +1,6 @@
 """Pickles, tables, figures, sweeps, types, and what is said of objects."""
 
+import multiprocessing
 import pickle
 import subprocess
 import sys
@@ -54,7 +55,7 @@ def test_a_sweep_does_not_depend_on_threads_or_processes():
     one = mp.sweep(pendulum(), GRID, threads=1, **options)
     assert len(one) == 6 and one["gamma"].tolist() == [0.1, 0.1, 0.2, 0.2, 0.4, 0.4] and one["energy_error"].max() < 1e-14
     assert mp.sweep(pendulum(), GRID, threads=3, **options).rows == one.rows
-    with ProcessPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert mp.sweep(pendulum(), GRID, map=pool.map, **options).rows == one.rows
 
 

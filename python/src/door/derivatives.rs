@@ -1,5 +1,7 @@
 //! Tangents of runs, and gradients of losses by the transposed steps.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use metriplectic::dynamics::ModelError as Broken;
@@ -10,7 +12,10 @@ use metriplectic::integrators::{
     Systems, TangentRun, Tangents as _,
 };
 use nalgebra::{DMatrix, SVector};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods as _, PyReadonlyArray1,
+    PyReadonlyArray2,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -20,7 +25,7 @@ use super::kinds::{Closed, Kind, Open, Recorded as _};
 use super::method::AnyMethod;
 use super::output::{Names, Output, written};
 use super::schedule::{Derivatives, Event, Point as _, Times, Watched, noting, watching};
-use super::system::{Chosen, RawSystem};
+use super::system::{Chosen, Parts, RawSystem};
 use super::tapes::tape;
 
 /// A kind of system whose runs have derivatives, at moving points that are lists of numbers.
@@ -38,6 +43,12 @@ struct Along {
     sizes: Vec<f64>,
     names: Vec<&'static str>,
 }
+
+/// Systems at parameters beside those of a run, by the bits of these.
+type Beside = RefCell<HashMap<Vec<u64>, Parts>>;
+
+/// The most systems that are kept.
+const MOST_KEPT: usize = 4096;
 
 /// The numbers of parameters of which there is an instance: a list is filled up to the next one by parameters that do nothing.
 macro_rules! counts {
@@ -97,12 +108,16 @@ struct Tangent {
 }
 
 /// Takes the derivatives of the entries from the matrix of all directions, along the start and along the parameters.
-fn parts<F: Smooth>(flow: &F, x: &Element<F>, whole: &DMatrix<f64>, [n, p]: [usize; 2]) -> [Vec<f64>; 2] {
+fn parts<F: Smooth>(
+    flow: &F,
+    x: &Element<F>,
+    whole: &DMatrix<f64>,
+    [n, p]: [usize; 2],
+) -> [Vec<f64>; 2] {
     let all = flow.directions();
     let entries = |columns: std::ops::Range<usize>| {
-        let moved: Vec<Vec<Real>> = columns
-            .map(|j| flow.moving(x, &whole.column(j).rows(0, all).into_owned()))
-            .collect();
+        let moved: Vec<Vec<Real>> =
+            columns.map(|j| flow.moving(x, &whole.column(j).rows(0, all).into_owned())).collect();
         let rows = moved.first().map_or(0, Vec::len);
         (0..rows).flat_map(|i| moved.iter().map(move |column| column[i].eps1)).collect::<Vec<f64>>()
     };
@@ -135,8 +150,12 @@ impl Tangent {
             let column = |name: String| (name, Vec::new(), Vec::new());
             let ports = names.ports.iter().map(|name| column(format!("work of {name}")));
             let baths = names.baths.iter();
-            let baths = baths.flat_map(|name| [format!("heat of {name}"), format!("entropy of {name}")]);
-            tangent.ledger = std::iter::once(column("work".to_owned())).chain(ports).chain(baths.map(column)).collect();
+            let baths =
+                baths.flat_map(|name| [format!("heat of {name}"), format!("entropy of {name}")]);
+            tangent.ledger = std::iter::once(column("work".to_owned()))
+                .chain(ports)
+                .chain(baths.map(column))
+                .collect();
         }
         for state in run.states() {
             tangent.t.push(state.time);
@@ -182,7 +201,10 @@ impl Tangent {
         let (dict, rows, [n, p]) = (PyDict::new(py), self.t.len(), self.lengths);
         dict.set_item("t", self.t.into_pyarray(py))?;
         dict.set_item("y", self.y.into_pyarray(py).reshape([rows, self.entries])?)?;
-        dict.set_item("along_start", self.along_start.into_pyarray(py).reshape([rows, self.entries, n])?)?;
+        dict.set_item(
+            "along_start",
+            self.along_start.into_pyarray(py).reshape([rows, self.entries, n])?,
+        )?;
         let along = self.along_parameters.into_pyarray(py).reshape([rows, self.entries, p])?;
         dict.set_item("along_parameters", along)?;
         let ledger = PyDict::new(py);
@@ -201,8 +223,14 @@ impl Tangent {
                 Ok([time_start, time_parameters, start, parameters]) => {
                     one.set_item("time_along_start", time_start.into_pyarray(py))?;
                     one.set_item("time_along_parameters", time_parameters.into_pyarray(py))?;
-                    one.set_item("along_start", start.into_pyarray(py).reshape([self.entries, n])?)?;
-                    one.set_item("along_parameters", parameters.into_pyarray(py).reshape([self.entries, p])?)?;
+                    one.set_item(
+                        "along_start",
+                        start.into_pyarray(py).reshape([self.entries, n])?,
+                    )?;
+                    one.set_item(
+                        "along_parameters",
+                        parameters.into_pyarray(py).reshape([self.entries, p])?,
+                    )?;
                 }
                 Err(message) => one.set_item("error", message)?,
             }
@@ -210,7 +238,8 @@ impl Tangent {
         }
         dict.set_item("events", events)?;
         dict.set_item("certificate", written(py, &self.certificate)?)?;
-        let Sensitivity { steps, energy, invariants, entropy, frozen, undamped, at_rest, .. } = self.sensitivity;
+        let Sensitivity { steps, energy, invariants, entropy, frozen, undamped, at_rest, .. } =
+            self.sensitivity;
         let laws = PyDict::new(py);
         laws.set_item("text", self.sensitivity.to_string())?;
         laws.set_item("steps", steps)?;
@@ -288,7 +317,8 @@ impl Asked {
         let n = directions(flow);
         let schedule = self.schedule.clone();
         let run = self.method.adjoint(system, x0, schedule).map_err(|error| of_tangent(&error))?;
-        let output = Output::from_parts((flow, names), run.states(), &[], (run.certificate(), run.ending()));
+        let output =
+            Output::from_parts((flow, names), run.states(), &[], (run.certificate(), run.ending()));
         let (value, weights) = weighed(output, weigh)?;
         let entries = weights.len() / run.states().len().max(1);
         let row = |k: usize| &weights[k * entries..][..entries];
@@ -323,10 +353,13 @@ fn weighed(output: Output, weigh: &Py<PyAny>) -> PyResult<(f64, Vec<f64>)> {
     Python::attach(|py| {
         let rows = output.rows();
         let run = output.into_dict(py)?;
-        let (value, weights): (f64, PyReadonlyArray2<'_, f64>) = weigh.call1(py, (run,))?.extract(py)?;
+        let (value, weights): (f64, PyReadonlyArray2<'_, f64>) =
+            weigh.call1(py, (run,))?.extract(py)?;
         if weights.as_array().dim() != rows {
             let (found, expected) = (weights.as_array().dim(), rows);
-            return Err(bad(format!("the weights have the shape {found:?}, and the states {expected:?}")));
+            return Err(bad(format!(
+                "the weights have the shape {found:?}, and the states {expected:?}"
+            )));
         }
         Ok((value, weights.as_array().iter().copied().collect()))
     })
@@ -397,7 +430,9 @@ impl RawSystem {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Asked> {
         if self.has_noise() {
-            return Err(bad("derivatives of runs with noise are not reachable from Python; leave the noise out"));
+            return Err(bad(
+                "derivatives of runs with noise are not reachable from Python; leave the noise out",
+            ));
         }
         Ok(Asked {
             start: start.as_array().to_vec(),
@@ -417,6 +452,21 @@ impl RawSystem {
         Ok(Along { places, sizes, names })
     }
 
+    /// The recorded system at these parameters. Steps beside others ask for the same ones again and again.
+    fn kept(&self, kept: &Beside, theta: &[f64]) -> PyResult<Parts> {
+        let bits: Vec<u64> = theta.iter().map(|value| value.to_bits()).collect();
+        if let Some(parts) = kept.borrow().get(&bits) {
+            return Ok(Arc::clone(parts));
+        }
+        let parts = self.parts_at(theta)?;
+        let mut kept = kept.borrow_mut();
+        if kept.len() >= MOST_KEPT {
+            kept.clear();
+        }
+        kept.insert(bits, Arc::clone(&parts));
+        Ok(parts)
+    }
+
     fn tangent_of(&self, asked: &Asked, along: &Along) -> PyResult<Tangent> {
         let (names, look, p) = (self.ledger_names(), &asked.look, along.places.len());
         let names = names.as_ref();
@@ -424,7 +474,11 @@ impl RawSystem {
             if p == 0 {
                 return asked.tangent(&open, &open, p, names, Derivatives::Start);
             }
-            let build = |theta: &[f64]| self.open(theta, look)?.ok_or_else(|| bad("the system is closed"));
+            let kept = Beside::default();
+            let build = |theta: &[f64]| {
+                let open = self.open_with(self.kept(&kept, theta)?, theta, look);
+                open.ok_or_else(|| bad("the system is closed"))
+            };
             return self.along_parameters(along, &build, &mut |system| {
                 asked.tangent(system, &**system, p, names, Derivatives::Parameters)
             });
@@ -433,7 +487,8 @@ impl RawSystem {
             let closed = self.closed(&self.theta, look)?;
             return asked.tangent(&closed, &closed, p, names, Derivatives::Start);
         }
-        let build = |theta: &[f64]| self.closed(theta, look);
+        let kept = Beside::default();
+        let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
         self.along_parameters(along, &build, &mut |system| {
             asked.tangent(system, &**system, p, names, Derivatives::Parameters)
         })
@@ -446,7 +501,11 @@ impl RawSystem {
             if p == 0 {
                 return asked.gradient(&open, &open, p, names, weigh);
             }
-            let build = |theta: &[f64]| self.open(theta, look)?.ok_or_else(|| bad("the system is closed"));
+            let kept = Beside::default();
+            let build = |theta: &[f64]| {
+                let open = self.open_with(self.kept(&kept, theta)?, theta, look);
+                open.ok_or_else(|| bad("the system is closed"))
+            };
             return self.along_parameters(along, &build, &mut |system| {
                 asked.gradient(system, &**system, p, names, weigh)
             });
@@ -455,7 +514,8 @@ impl RawSystem {
             let closed = self.closed(&self.theta, look)?;
             return asked.gradient(&closed, &closed, p, names, weigh);
         }
-        let build = |theta: &[f64]| self.closed(theta, look);
+        let kept = Beside::default();
+        let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
         self.along_parameters(along, &build, &mut |system| {
             asked.gradient(system, &**system, p, names, weigh)
         })
@@ -486,7 +546,9 @@ pub(crate) fn gradient<'py>(
 ) -> PyResult<(f64, Bound<'py, PyArray1<f64>>)> {
     let (tape, x) = (tape(program)?, x.as_array().to_vec());
     if tape.inputs() != x.len() || tape.outputs().len() != 1 {
-        return Err(bad("the gradient is that of a function with one number, at as many numbers as it was recorded with"));
+        return Err(bad(
+            "the gradient is that of a function with one number, at as many numbers as it was recorded with",
+        ));
     }
     let mut df = vec![0.0; x.len()];
     let value = py.detach(|| tape.gradient(&x, &mut df));
@@ -502,7 +564,11 @@ pub(crate) fn evaluate<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (tape, x) = (tape(program)?, x.as_array());
     if x.ncols() != tape.inputs() {
-        return Err(bad(format!("rows of {} numbers are expected, not of {}", tape.inputs(), x.ncols())));
+        return Err(bad(format!(
+            "rows of {} numbers are expected, not of {}",
+            tape.inputs(),
+            x.ncols()
+        )));
     }
     let (rows, count) = (x.nrows(), tape.outputs().len());
     let mut all = vec![0.0; rows * count];
@@ -524,7 +590,11 @@ pub(crate) fn jacobian<'py>(
 ) -> PyResult<Slopes<'py>> {
     let (tape, x) = (tape(program)?, x.as_array());
     if x.ncols() != tape.inputs() {
-        return Err(bad(format!("rows of {} numbers are expected, not of {}", tape.inputs(), x.ncols())));
+        return Err(bad(format!(
+            "rows of {} numbers are expected, not of {}",
+            tape.inputs(),
+            x.ncols()
+        )));
     }
     let [rows, inputs, outputs] = [x.nrows(), x.ncols(), tape.outputs().len()];
     let (mut values, mut slopes) = (vec![0.0; rows * outputs], vec![0.0; rows * outputs * inputs]);
@@ -534,7 +604,12 @@ pub(crate) fn jacobian<'py>(
             let mut weights = vec![0.0; outputs];
             weights[i] = 1.0;
             let value = &mut values[k * outputs..][..outputs];
-            tape.pull_back(&row, &weights, value, &mut slopes[(k * outputs + i) * inputs..][..inputs]);
+            tape.pull_back(
+                &row,
+                &weights,
+                value,
+                &mut slopes[(k * outputs + i) * inputs..][..inputs],
+            );
         }
     }
     let values = values.into_pyarray(py).reshape([rows, outputs])?;

@@ -69,13 +69,15 @@ pub(crate) fn least_squares<'py>(
         let executor = Executor::new(&problem, solver)
             .configure(|state| state.param(guess).max_iters(iterations));
         let found = executor.run().map_err(|error| RunError::new_err(error.to_string()))?;
-        let converged = found.state().get_termination_reason() == Some(&TerminationReason::SolverConverged);
+        let converged =
+            found.state().get_termination_reason() == Some(&TerminationReason::SolverConverged);
         Ok((found.state().get_best_param().cloned(), converged))
     })
     .map_err(|refused| error.lock().ok().and_then(|mut error| error.take()).unwrap_or(refused))?;
     if let Some(raised) = error.lock().ok().and_then(|mut error| error.take()) {
         return Err(raised);
     }
-    let best = best.ok_or_else(|| RunError::new_err("the fit has found no parameters with a run"))?;
+    let best =
+        best.ok_or_else(|| RunError::new_err("the fit has found no parameters with a run"))?;
     Ok((best.into_pyarray(py), converged))
 }

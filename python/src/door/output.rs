@@ -1,8 +1,6 @@
 //! Runs as arrays.
 
-use metriplectic::integrators::{
-    Certificate, Ending, Event, InvariantBalance, State, Trajectory,
-};
+use metriplectic::integrators::{Certificate, Ending, Event, InvariantBalance, State, Trajectory};
 use numpy::{IntoPyArray, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -39,7 +37,8 @@ impl Rows {
             let whole = ["work", "event work", "event heat"].map(str::to_owned);
             let ports = names.ports.iter().map(|name| format!("work of {name}"));
             let baths = names.baths.iter();
-            let baths = baths.flat_map(|name| [format!("heat of {name}"), format!("entropy of {name}")]);
+            let baths =
+                baths.flat_map(|name| [format!("heat of {name}"), format!("entropy of {name}")]);
             whole.into_iter().chain(ports).chain(baths).map(column).collect()
         });
         Self { ledger, ..Self::default() }
@@ -66,7 +65,8 @@ impl Rows {
         let Self { step, t, y, fields: [energy, entropy], laws: [balance, total], ledger } = self;
         let (rows, dict) = (t.len(), PyDict::new(py));
         let entries = y.len() / rows.max(1);
-        let step: Vec<i64> = step.into_iter().map(|k| i64::try_from(k).unwrap_or(i64::MAX)).collect();
+        let step: Vec<i64> =
+            step.into_iter().map(|k| i64::try_from(k).unwrap_or(i64::MAX)).collect();
         dict.set_item("step", step.into_pyarray(py))?;
         dict.set_item("t", t.into_pyarray(py))?;
         dict.set_item("y", y.into_pyarray(py).reshape([rows, entries])?)?;

@@ -80,7 +80,11 @@ impl Times {
                 let steps = count.round();
                 // The refusal of a size or an end that makes no sense is that of the library.
                 if !(h > 0.0 && count > 0.0 && count.is_finite()) {
-                    return Ok(if h > 0.0 { Span::until(end).into() } else { Span::steps(h, 1).into() });
+                    return Ok(if h > 0.0 {
+                        Span::until(end).into()
+                    } else {
+                        Span::steps(h, 1).into()
+                    });
                 }
                 if steps < 1.0 || (count - steps).abs() > 1e-9 * steps || steps > 1e15 {
                     return Err(SpanError::new_err(format!(
@@ -89,7 +93,11 @@ impl Times {
                         self.start
                     )));
                 }
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is a whole number from 1 to 10¹⁵")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "it is a whole number from 1 to 10¹⁵"
+                )]
                 Ok(Span::steps(h, steps as usize).into())
             }
             (Some(_), None, None) => Err(SpanError::new_err(
@@ -174,9 +182,8 @@ impl Event<'_> {
     ///
     /// `TraceError` if they are no recordings.
     pub(crate) fn read(&self, theta: &Arc<[f64]>) -> PyResult<Watched> {
-        let function = |program| {
-            tape(program).map(|tape| Function { tape, theta: Arc::clone(theta) })
-        };
+        let function =
+            |program| tape(program).map(|tape| Function { tape, theta: Arc::clone(theta) });
         Ok(Watched {
             name: self.name.clone(),
             function: function(&self.function)?,
@@ -279,8 +286,7 @@ impl Watched {
         }
         let Some(map) = self.jump.clone() else { return watched.into() };
         let narrow = map.clone();
-        let mut jumping =
-            watched.jump(move |t, x: &P| x.with(&narrow.outputs(x.entries(), t)));
+        let mut jumping = watched.jump(move |t, x: &P| x.with(&narrow.outputs(x.entries(), t)));
         if let Some(temperature) = self.heat_at {
             jumping = jumping.heat_at(temperature);
         }
@@ -298,7 +304,9 @@ impl Watched {
             }
             Derivatives::Parameters => {
                 jumping = jumping.differentiable(
-                    move |t, (x, theta): &(Vec<Real>, Vec<Real>)| function.outputs_at(x, t, theta)[0],
+                    move |t, (x, theta): &(Vec<Real>, Vec<Real>)| {
+                        function.outputs_at(x, t, theta)[0]
+                    },
                     move |t, (x, theta): &(Vec<Real>, Vec<Real>)| {
                         (map.outputs_at(x, t, theta), theta.clone())
                     },

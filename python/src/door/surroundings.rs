@@ -86,8 +86,16 @@ impl Surroundings {
         };
         for (name, velocity) in ports {
             let velocity = tape(velocity)?;
-            expect(&format!("the input of the port `{name}`"), velocity.inputs(), entries + 1 + parameters)?;
-            expect(&format!("the velocity of the port `{name}`"), velocity.outputs().len(), directions)?;
+            expect(
+                &format!("the input of the port `{name}`"),
+                velocity.inputs(),
+                entries + 1 + parameters,
+            )?;
+            expect(
+                &format!("the velocity of the port `{name}`"),
+                velocity.outputs().len(),
+                directions,
+            )?;
             read.ports.push(Port { name: name.as_str().into(), velocity });
         }
         for (name, temperature, contacts) in baths {
@@ -96,11 +104,16 @@ impl Surroundings {
                 Err(_) => Warmth::Function(tape(temperature)?),
             };
             if let Warmth::Function(tape) = &temperature {
-                expect(&format!("the input of the temperature of `{name}`"), tape.inputs(), entries + 1 + parameters)?;
+                expect(
+                    &format!("the input of the temperature of `{name}`"),
+                    tape.inputs(),
+                    entries + 1 + parameters,
+                )?;
                 expect(&format!("the temperature of `{name}`"), tape.outputs().len(), 1)?;
             }
             let contacts = tape(contacts)?;
-            let (inputs, outputs) = (entries + directions + 1 + parameters, contacts.outputs().len());
+            let (inputs, outputs) =
+                (entries + directions + 1 + parameters, contacts.outputs().len());
             expect(&format!("the input of the contacts of `{name}`"), contacts.inputs(), inputs)?;
             if outputs == 0 || !outputs.is_multiple_of(directions + 1) {
                 return Err(bad(format!(
@@ -131,7 +144,8 @@ impl Surroundings {
         for Port { name, velocity } in &self.ports {
             let (velocity, theta) = (Arc::clone(velocity), Arc::clone(theta));
             open = open.work(Arc::clone(name), move |t, x, v| {
-                let inputs: Vec<f64> = x.iter().copied().chain([t]).chain(theta.iter().copied()).collect();
+                let inputs: Vec<f64> =
+                    x.iter().copied().chain([t]).chain(theta.iter().copied()).collect();
                 velocity.evaluate(&inputs, v);
             });
         }

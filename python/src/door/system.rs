@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use metriplectic::dynamics::noise::{Boltzmann, Uniform};
 use metriplectic::dynamics::ModelError as Broken;
+use metriplectic::dynamics::noise::{Boltzmann, Uniform};
 use metriplectic::equations::{FrictionTerms, Report};
 use metriplectic::integrators::{
     FromEquations, Method as _, NinomiyaVictoir, Noisy, RandomFlow, RunError as NotRun, Sampler,
@@ -60,12 +60,19 @@ impl Chosen {
         let name = self.method.as_str();
         let has_gradient = AnyMethod::has_gradient(name);
         if self.gradient.is_some() && !has_gradient {
-            return Err(bad(format!("the method \"{name}\" has no discrete gradient; leave `gradient=` out")));
+            return Err(bad(format!(
+                "the method \"{name}\" has no discrete gradient; leave `gradient=` out"
+            )));
         }
-        let gradient = self.gradient.as_deref().unwrap_or(if has_gradient { "gonzalez" } else { "" });
+        let gradient =
+            self.gradient.as_deref().unwrap_or(if has_gradient { "gonzalez" } else { "" });
         AnyMethod::named(name, gradient).ok_or_else(|| {
             let (of, what, names) = if AnyMethod::names().contains(&name) {
-                (gradient, "discrete gradient", vec!["gonzalez", "mean-value", "itoh-abe", "symmetric-itoh-abe"])
+                (
+                    gradient,
+                    "discrete gradient",
+                    vec!["gonzalez", "mean-value", "itoh-abe", "symmetric-itoh-abe"],
+                )
             } else {
                 (name, "method", AnyMethod::names())
             };
@@ -154,20 +161,32 @@ impl RawSystem {
     }
 
     /// The system of a run.
-    pub(crate) fn supervised(&self, parts: Parts, look: &Arc<Look>) -> Interruptible {
+    fn supervised(&self, parts: Parts, look: &Arc<Look>) -> Interruptible {
         Interruptible::new(parts, Arc::clone(look), self.is_verified)
     }
 
     /// The closed system of a run at values of the parameters.
     pub(crate) fn closed(&self, theta: &[f64], look: &Arc<Look>) -> PyResult<Closed> {
-        Ok(FromEquations(self.supervised(self.parts_at(theta)?, look)))
+        Ok(self.closed_with(self.parts_at(theta)?, look))
+    }
+
+    /// The closed system of a run from its parts.
+    pub(crate) fn closed_with(&self, parts: Parts, look: &Arc<Look>) -> Closed {
+        FromEquations(self.supervised(parts, look))
     }
 
     /// The open system of a run at values of the parameters; `None` if it is closed.
     pub(crate) fn open(&self, theta: &[f64], look: &Arc<Look>) -> PyResult<Option<Open>> {
-        let Some(surroundings) = &self.surroundings else { return Ok(None) };
-        let system = self.supervised(self.parts_at(theta)?, look);
-        Ok(Some(surroundings.around(system, &theta.into())))
+        if self.surroundings.is_none() {
+            return Ok(None);
+        }
+        Ok(self.open_with(self.parts_at(theta)?, theta, look))
+    }
+
+    /// The open system of a run from its parts; `None` if it is closed.
+    pub(crate) fn open_with(&self, parts: Parts, theta: &[f64], look: &Arc<Look>) -> Option<Open> {
+        let surroundings = self.surroundings.as_ref()?;
+        Some(surroundings.around(self.supervised(parts, look), &theta.into()))
     }
 
     pub(crate) fn ledger_names(&self) -> Option<Names> {
@@ -183,7 +202,12 @@ impl RawSystem {
     }
 
     /// Runs the system, of whatever kind it is.
-    fn run_any(&self, chosen: &Chosen, method: AnyMethod, request: &Request) -> Result<Output, Failed> {
+    fn run_any(
+        &self,
+        chosen: &Chosen,
+        method: AnyMethod,
+        request: &Request,
+    ) -> Result<Output, Failed> {
         let failed = |error| Failed { error, partial: None };
         let names = self.ledger_names();
         let names = names.as_ref();
@@ -200,7 +224,8 @@ impl RawSystem {
             }
             (Some(open), Some(k_b)) => {
                 let n = self.sizes().map_err(failed)?[1];
-                let contacts = self.surroundings.as_ref().map_or_else(Vec::new, |of| of.contacts(n));
+                let contacts =
+                    self.surroundings.as_ref().map_or_else(Vec::new, |of| of.contacts(n));
                 let noisy = open.with_noise(Boltzmann(k_b), &contacts);
                 sampled(&noisy, names, (chosen, method), request)
             }
@@ -236,7 +261,8 @@ where
         "random-flow" => by!(RandomFlow(method)),
         "ninomiya-victoir" => by!(NinomiyaVictoir(method)),
         other => {
-            let message = format!("there is no sampler \"{other}\"; there are random-flow, ninomiya-victoir");
+            let message =
+                format!("there is no sampler \"{other}\"; there are random-flow, ninomiya-victoir");
             Err(Failed { error: bad(message), partial: None })
         }
     }
@@ -281,7 +307,11 @@ impl RawSystem {
     /// The system at other values of its parameters. Nothing is recorded again.
     fn at(&self, theta: Vec<f64>) -> PyResult<Self> {
         if theta.len() != self.theta.len() {
-            return Err(bad(format!("there are {} parameters, not {}", self.theta.len(), theta.len())));
+            return Err(bad(format!(
+                "there are {} parameters, not {}",
+                self.theta.len(),
+                theta.len()
+            )));
         }
         self.parts_at(&theta)?;
         Ok(Self {
@@ -301,7 +331,12 @@ impl RawSystem {
     }
 
     /// Verifies the laws around a start, and returns the system with this certificate.
-    fn verified(&self, py: Python<'_>, start: PyReadonlyArray1<'_, f64>, time: f64) -> PyResult<Self> {
+    fn verified(
+        &self,
+        py: Python<'_>,
+        start: PyReadonlyArray1<'_, f64>,
+        time: f64,
+    ) -> PyResult<Self> {
         let start = start.as_array().to_vec();
         caught(|| py.detach(|| self.verify(&start, time)))?;
         Ok(Self {
@@ -323,8 +358,10 @@ impl RawSystem {
     ) -> PyResult<(Vec<(&'static str, f64, f64, Vec<f64>)>, Option<String>, String)> {
         let start = start.as_array().to_vec();
         let report = caught(|| py.detach(|| self.reported(&start, time)))?;
-        let text = in_python(&report.verdict.as_ref().err().map_or_else(String::new, ToString::to_string));
-        let rows = report.laws.iter().map(|law| (law.law, law.size, law.allowed, law.point.clone()));
+        let text =
+            in_python(&report.verdict.as_ref().err().map_or_else(String::new, ToString::to_string));
+        let rows =
+            report.laws.iter().map(|law| (law.law, law.size, law.allowed, law.point.clone()));
         let verdict = report.verdict.is_err().then_some(text);
         Ok((rows.collect(), verdict, report.to_string()))
     }
@@ -387,8 +424,10 @@ impl RawSystem {
         threads: usize,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let look = Look::new(None);
-        let (schedule, events, method) = (times.schedule()?, self.events(&events)?, chosen.method()?);
-        let starts: Vec<Vec<f64>> = starts.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
+        let (schedule, events, method) =
+            (times.schedule()?, self.events(&events)?, chosen.method()?);
+        let starts: Vec<Vec<f64>> =
+            starts.as_array().rows().into_iter().map(|row| row.to_vec()).collect();
         let next = AtomicUsize::new(0);
         let one = |k: usize| {
             let request = Request {

@@ -23,7 +23,9 @@ pub(crate) fn tape(program: &Bound<'_, PyAny>) -> PyResult<Arc<Tape>> {
     let outputs: PyReadonlyArray1<'_, u32> = program.getattr("outputs")?.extract()?;
     let (ops, operands, constants) = (ops.as_array(), operands.as_array(), constants.as_array());
     if operands.shape() != [ops.len(), 3] || constants.len() != ops.len() {
-        return Err(TraceError::new_err("a recording needs three operands and a constant for each operation"));
+        return Err(TraceError::new_err(
+            "a recording needs three operands and a constant for each operation",
+        ));
     }
     let code = (0..ops.len())
         .map(|k| (ops[k], [0, 1, 2].map(|i| operands[[k, i]]), constants[k]))

@@ -11,7 +11,7 @@ import numpy as np
 from . import linear, ufuncs  # noqa: F401  ufuncs fills its tables
 from .operations import Op
 from .recording import Recording
-from .symbols import FUNCTIONS, REDUCTIONS, UFUNCS, SymbolArray, Symbolic, SymbolNumber, computed, lift, moved, symbol
+from .symbols import FUNCTIONS, REDUCTIONS, UFUNCS, SymbolArray, Symbolic, SymbolNumber, computed, laid_out, lift, moved, symbol
 
 
 def _enter(names: str, record: Callable[..., Any]) -> None:
@@ -97,10 +97,11 @@ _move("concatenate concat stack hstack vstack dstack column_stack block")
 
 def _each(function: Any) -> Callable[..., Any]:
     def record(recording: Recording, *arrays: Any, **options: Any) -> Any:
-        ids = function(*(lift(recording, a)[0] for a in arrays), **options)
+        lifted = [lift(recording, a) for a in arrays]
+        ids = function(*(ids for ids, _ in lifted), **options)
         if isinstance(ids, np.ndarray):
-            return SymbolArray(recording, ids)
-        return type(ids)(SymbolArray(recording, one) for one in ids)
+            return SymbolArray(recording, ids, lifted[0][1])
+        return type(ids)(SymbolArray(recording, one, is_condition) for one, (_, is_condition) in zip(ids, lifted))
 
     return record
 
@@ -164,7 +165,18 @@ _enter("copyto", _copyto)
 def _new(recording: Recording, shape: Any, value: Any) -> Any:
     if _is_symbolic_shape(shape):
         raise recording.refusal("the shape of an array depends on the state", "give numbers, such as len(x)")
-    return SymbolArray(recording, np.array(np.broadcast_to(lift(recording, value)[0], shape)))
+    return SymbolArray(recording, np.array(np.broadcast_to(lift(recording, value)[0], shape), order="C"))
+
+
+def _new_like(recording: Recording, a: Any, value: Any, order: Any, shape: Any) -> Any:
+    like, is_condition = lift(recording, a)
+    if is_condition:
+        raise recording.refusal("an array like conditions would hold booleans", "write np.zeros(shape, like=x) for numbers")
+    if _is_symbolic_shape(shape):
+        return _new(recording, shape, value)
+    ids = np.empty_like(like, order=order, shape=shape)
+    ids[...] = lift(recording, value)[0]
+    return SymbolArray(recording, ids)
 
 
 def _is_symbolic_shape(shape: Any) -> bool:
@@ -176,16 +188,19 @@ _enter("ones", lambda r, shape, order="C": _new(r, shape, 1.0))
 # What is read before it is written is not a number, where NumPy's is anything.
 _enter("empty", lambda r, shape, order="C": _new(r, shape, np.nan))
 _enter("full", lambda r, shape, fill_value, order="C": _new(r, shape, fill_value))
-_enter("zeros_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, 0.0))
-_enter("ones_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, 1.0))
-_enter("empty_like", lambda r, a, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, np.nan))
-_enter("full_like", lambda r, a, v, order="K", subok=True, shape=None: _new(r, np.shape(a) if shape is None else shape, v))
+_enter("zeros_like", lambda r, a, order="K", subok=True, shape=None: _new_like(r, a, 0.0, order, shape))
+_enter("ones_like", lambda r, a, order="K", subok=True, shape=None: _new_like(r, a, 1.0, order, shape))
+_enter("empty_like", lambda r, a, order="K", subok=True, shape=None: _new_like(r, a, np.nan, order, shape))
+_enter("full_like", lambda r, a, v, order="K", subok=True, shape=None: _new_like(r, a, v, order, shape))
 _enter("eye", lambda r, N, M=None, k=0, order="C": _new(r, (N, N if M is None else M), np.eye(N, M, k)))
 _enter("identity", lambda r, n: _new(r, (n, n), np.eye(n)))
-_enter("array asarray", lambda r, object, copy=True: _copied(r, object))
+_enter("array", lambda r, object, copy=True: _converted(r, object, copy))
+_enter("asarray asanyarray ascontiguousarray", lambda r, a, copy=None: _converted(r, a, copy))
 
 
-def _copied(recording: Recording, nested: Any) -> Any:
+def _converted(recording: Recording, nested: Any, copy: Any) -> Any:
+    if isinstance(nested, SymbolArray) and not copy:
+        return nested
     ids, is_condition = lift(recording, nested)
     return SymbolArray(recording, np.array(ids), is_condition)
 
@@ -322,6 +337,8 @@ def _chosen(recording: Recording, condition: Any, x: Any, y: Any) -> Any:
         ids = np.where(condition, yes, no)
     else:
         ids = recording.put_all(Op.SELECT, lift(recording, condition)[0], yes, no)
+    if not (yes.flags.c_contiguous and no.flags.c_contiguous):
+        ids = laid_out(ids, lambda: np.where(condition.ids if isinstance(condition, Symbolic) else condition, yes, no))
     return computed(recording, ids, is_yes and is_no)
 
 

@@ -18,9 +18,17 @@ def _mismatch(recording: Recording, a: Registers, b: Registers) -> Exception:
     return recording.refusal(f"the shapes {a.shape} and {b.shape} do not fit in a product", "compare the shapes")
 
 
+def _numbers(recording: Recording, *arrays: Any) -> list[Registers]:
+    """Lifts the factors of a product; that of booleans alone is a disjunction in NumPy, and refused."""
+    lifted = [lift(recording, array) for array in arrays]
+    if all(is_condition for _, is_condition in lifted):
+        raise recording.refusal("a product of conditions alone is a condition in NumPy", "write np.where(condition, 1.0, 0.0) for numbers")
+    return [ids for ids, _ in lifted]
+
+
 def matmul(recording: Recording, a: Any, b: Any) -> Any:
     """The product ``a @ b``, (..., n, k) by (..., k, m)."""
-    left, right = lift(recording, a)[0], lift(recording, b)[0]
+    left, right = _numbers(recording, a, b)
     if left.ndim == 0 or right.ndim == 0:
         raise recording.refusal("a number stands in `a @ b`", "write a * b")
     rows = left if left.ndim > 1 else left[None, :]
@@ -37,7 +45,7 @@ def matmul(recording: Recording, a: Any, b: Any) -> Any:
 
 def dot(recording: Recording, a: Any, b: Any, out: None = None) -> Any:
     """NumPy's ``dot``: the sum over the last axis of ``a`` and the last but one of ``b``."""
-    left, right = lift(recording, a)[0], lift(recording, b)[0]
+    left, right = _numbers(recording, a, b)
     if left.ndim == 0 or right.ndim == 0:
         return symbol(recording, a) * symbol(recording, b)
     if right.ndim > 1:
@@ -47,7 +55,7 @@ def dot(recording: Recording, a: Any, b: Any, out: None = None) -> Any:
 
 def inner(recording: Recording, a: Any, b: Any) -> Any:
     """NumPy's ``inner``: the sum over the last axes."""
-    left, right = lift(recording, a)[0], lift(recording, b)[0]
+    left, right = _numbers(recording, a, b)
     if left.ndim == 0 or right.ndim == 0:
         return symbol(recording, a) * symbol(recording, b)
     return _paired(recording, left, right)
@@ -66,7 +74,7 @@ def vdot(recording: Recording, a: Any, b: Any) -> Any:
 
 
 def vecdot(recording: Recording, a: Any, b: Any, axis: int = -1) -> Any:
-    left, right = (np.moveaxis(lift(recording, x)[0], axis, -1) for x in (a, b))
+    left, right = (np.moveaxis(ids, axis, -1) for ids in _numbers(recording, a, b))
     if left.shape[-1] != right.shape[-1]:
         raise _mismatch(recording, left, right)
     return computed(recording, recording.contraction(left, right))
@@ -88,7 +96,7 @@ def outer(recording: Recording, a: Any, b: Any) -> Any:
 
 
 def tensordot(recording: Recording, a: Any, b: Any, axes: Any = 2) -> Any:
-    left, right = lift(recording, a)[0], lift(recording, b)[0]
+    left, right = _numbers(recording, a, b)
     if isinstance(axes, (int, np.integer)):
         axes = (range(left.ndim - int(axes), left.ndim), range(int(axes)))
     along_a, along_b = ([int(k) for k in np.atleast_1d(one)] for one in axes)
@@ -112,7 +120,7 @@ def einsum(recording: Recording, subscripts: Any, *operands: Any, optimize: Any 
     terms = inputs.split(",")
     if not arrow:
         output = "".join(sorted(c for c in set(inputs) - {","} if inputs.count(c) == 1))
-    arrays = [lift(recording, operand)[0] for operand in operands]
+    arrays = _numbers(recording, *operands)
     # NumPy raises what is wrong with the letters or the shapes.
     np.einsum(f"{inputs}->{output}", *(np.broadcast_to(0.0, ids.shape) for ids in arrays), optimize=True)
     letters, result = "", recording.constants(1.0)

@@ -147,7 +147,9 @@ class Recording:
             registers = self.put_all(Op.LITERAL, np.zeros(values.shape, np.int64), k=values)
         else:
             registers = np.array([self.constant(value) for value in values.tolist()], np.int64)
-        return registers[places.reshape(-1)].reshape(array.shape)
+        result = np.empty_like(array, np.int64)  # in the order of the array in memory
+        result[...] = registers[places.reshape(-1)].reshape(array.shape)
+        return result
 
     def known(self, registers: Registers) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
         """Returns which registers are constants, and their values (0 for the others)."""

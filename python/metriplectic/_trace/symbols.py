@@ -89,11 +89,13 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
         recording = self.recording
         if dtype is not None and np.dtype(dtype) != object:
             raise recording.refusal(f"an array of the type {np.dtype(dtype)} cannot hold symbols", _REMEDIES["dtype"])
+        if self.is_condition:  # The sum of an array of objects would be a disjunction, where that of booleans counts.
+            raise recording.refusal("NumPy makes an array of objects from conditions", self._remedy("write np.stack([..]) of conditions"))
         if recording.converted is None:
             recording.converted = place()[0]
         entries = np.empty(self.ids.size, object)
         for k, register in enumerate(self.ids.ravel().tolist()):
-            entries[k] = SymbolNumber(recording, register, self.is_condition)
+            entries[k] = SymbolNumber(recording, register)
         # A view of the state in NumPy is a copy here, which must not be written to in its place.
         entries.flags.writeable = copy is True
         return entries.reshape(self.ids.shape)
@@ -101,14 +103,18 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
     # No values.
 
     def __bool__(self) -> bool:
-        line = place()[1]
-        remedy = next((text for pattern, text in _BRANCHES if re.search(pattern, line)), _BRANCH_REMEDY)
+        remedy = self._remedy(_BRANCH_REMEDY)
         if self.recording.converted is not None:
             remedy += (
                 f"; {self.recording.converted} made an array of objects, which NumPy compares entry by entry:"
                 " metriplectic.array makes one that is recorded"
             )
         raise self.recording.refusal("a branch depends on the state, and one recording holds for all states", remedy)
+
+    def _remedy(self, otherwise: str) -> str:
+        """The remedy for the line that is running."""
+        line = place()[1]
+        return next((text for pattern, text in _BRANCHES if re.search(pattern, line)), otherwise)
 
     def _number(self, *_: Any) -> Any:
         line = place()[1]
@@ -224,11 +230,13 @@ class Symbolic(np.lib.mixins.NDArrayOperatorsMixin):
     def copy(self, order: Any = "C") -> Any:
         return moved(self, self.ids.copy(order))
 
-    def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
+    def astype(self, dtype: Any, order: Any = "K", casting: Any = None, subok: Any = True, copy: bool = True) -> Any:
         to_condition = self.is_condition and np.dtype(dtype) == np.bool_
         if np.dtype(dtype) != np.float64 and not to_condition:
             raise self.recording.refusal(f"the state is turned into numbers of the type {np.dtype(dtype)}", "leave .astype(..) out")
-        return computed(self.recording, self.ids.copy(), to_condition)
+        if not copy and to_condition == self.is_condition:
+            return self
+        return computed(self.recording, self.ids.copy(order), to_condition)
 
     def sum(self, *arguments: Any, **options: Any) -> Any:
         return np.sum(self, *arguments, **options)
@@ -435,11 +443,10 @@ def lift(recording: Recording, value: Any) -> tuple[Registers, bool]:
         return value.ids, value.is_condition
     if type(value) in (float, int, bool):
         return np.array(recording.constant(float(value)), np.int64), type(value) is bool
-    if isinstance(value, (list, tuple)) and value and all(type(entry) is SymbolNumber for entry in value):
-        return _lift_objects(recording, value, (len(value),))
-    converted = recording.converted
+    if isinstance(value, (list, tuple)) and _first_symbol(value) is not None:
+        parts = [lift(recording, entry) for entry in value]
+        return np.stack([ids for ids, _ in parts]), all(is_condition for _, is_condition in parts)
     array = np.asarray(value)
-    recording.converted = converted
     kind = array.dtype.kind
     if kind == "O":
         return _lift_objects(recording, array.ravel().tolist(), array.shape)
@@ -468,6 +475,18 @@ def _lift_objects(recording: Recording, entries: Any, shape: tuple[int, ...]) ->
             raise recording.refusal(f"an object of the type {kind} meets the state", remedy)
         are_conditions = are_conditions and is_condition
     return np.array(registers, np.int64).reshape(shape), are_conditions
+
+
+def laid_out(ids: Registers, like: Any) -> Registers:
+    """Gives registers the order in memory of NumPy's result, which says whether `ravel` and `reshape` make views of it or copies.
+
+    ``like`` makes an array of this layout; it is called if the operands are not in the order of rows.
+    """
+    if ids.ndim < 2:
+        return ids
+    result: Registers = np.empty_like(like())
+    result[...] = ids
+    return result
 
 
 def symbol(recording: Recording, value: Any) -> Any:
@@ -507,6 +526,9 @@ def _in_place(recording: Recording, ufunc: np.ufunc, method: str, operands: Any,
     result = getattr(ufunc, method)(*operands, **options)
     if isinstance(target, SymbolNumber):
         return result
+    if isinstance(target, np.ndarray) and target.dtype == object:
+        target[...] = np.asarray(result)
+        return target
     if not isinstance(target, SymbolArray):
         raise recording.refusal(f"np.{ufunc.__name__} writes a part of the state into an array of numbers", _REMEDIES["writing"])
     target.check_writeable()

@@ -9,7 +9,7 @@ import numpy as np
 
 from .operations import Op
 from .recording import Recording, Registers
-from .symbols import REDUCTIONS, UFUNCS, computed, lift
+from .symbols import REDUCTIONS, UFUNCS, computed, laid_out, lift
 
 _Rule = Callable[..., Registers]
 
@@ -37,7 +37,11 @@ def _elementwise(name: str, rule: _Rule, *, to_condition: bool = False, of_condi
             raise recording.refusal(f"the shapes {shapes} do not fit in np.{name}", "compare the shapes") from None
         is_condition = to_condition or (are_conditions and of_conditions in ("condition", "only"))
         chosen = _OF_CONDITIONS.get(name, rule) if are_conditions else rule
-        return computed(recording, chosen(recording, *ids), is_condition)
+        result = chosen(recording, *ids)
+        registers = [ids for ids, _ in lifted]
+        if not all(one.flags.c_contiguous for one in registers):
+            result = laid_out(result, lambda: sum(registers[1:], registers[0].copy("K")))
+        return computed(recording, result, is_condition)
 
     UFUNCS[name] = record
 
@@ -191,7 +195,8 @@ def reduction(
     if initial is not None and initial is not np._NoValue:
         start = np.broadcast_to(lift(recording, initial)[0], terms.shape[:-1])
         terms = np.concatenate([start[..., None], terms], axis=-1)
-    return total(terms).reshape(shape)
+    result = total(terms).reshape(shape)
+    return result if ids.flags.c_contiguous else laid_out(result, lambda: ufunc.reduce(ids, axis=axis, keepdims=keepdims))
 
 
 def _reduced(op: Op, neutral: float, ufunc: np.ufunc) -> Callable[..., Any]:
@@ -223,7 +228,8 @@ def _reduced_extremum(op: Op, ufunc: np.ufunc) -> Callable[..., Any]:
                 found = _extremum(op)(recording, found, terms[..., k])
             return found
 
-        return computed(recording, reduction(recording, a, ufunc, total, axis=axis, keepdims=keepdims, initial=initial))
+        result = reduction(recording, a, ufunc, total, axis=axis, keepdims=keepdims, initial=initial)
+        return computed(recording, result, lift(recording, a)[1] and initial in (None, np._NoValue))
 
     return record
 

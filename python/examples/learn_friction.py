@@ -21,24 +21,20 @@ STARTS = [[2.2, 0.0, 0.0], [-1.0, 1.6, 0.0]]
 POISSON = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 0]])
 
 
-def pendulum(rate, **options):
+def pendulum(rate, weights):
     """A pendulum with the entropy of its heat: x = (q, p, s), H = ½p² − cos q + s, S = s, p' = −sin q − γ p, s' = γ p²."""
 
-    def friction(x, w, **theta):
-        return [(rate(x[1], **theta), np.stack([0.0 * w[0], -w[2], w[1]]))]
-
-    if "parameters" in options:
-        def friction(x, w, weights):  # noqa: F811
-            return [(rate(x[1], weights), np.stack([0.0 * w[0], -w[2], w[1]]))]
+    def friction(x, w, weights):
+        return [(rate(x[1], weights), np.stack([0.0 * w[0], -w[2], w[1]]))]
 
     return mp.System(
         mp.R(3), energy=lambda x: 0.5 * x[1] ** 2 - np.cos(x[0]) + x[2], entropy=lambda x: x[2], poisson=POISSON, friction=friction,
-        **options,
+        parameters={"weights": weights},
     )
 
 
-def true_rate(p):
-    return 0.1 + 0.4 * p * p
+def true_rate(p, weights):
+    return weights[0] + weights[1] * p * p
 
 
 def network(p, weights):
@@ -50,11 +46,11 @@ def network(p, weights):
 def learn(iterations=60, seed=0):
     """Returns the true and the learnt system, the data, and the losses."""
     rng, times = np.random.default_rng(seed), np.linspace(0.3, 6.0, 20)
-    truth = pendulum(true_rate)
+    truth = pendulum(true_rate, [0.1, 0.4])
     data = [truth.run(x, t=6.0, tol=1e-9, at=times).y[1:, 0] + 0.005 * rng.standard_normal(20) for x in STARTS]
     weights = 0.5 * rng.standard_normal(3 * NEURONS + 1)
     weights[-1] = -1.0
-    model, losses = pendulum(network, parameters={"weights": weights}), []
+    model, losses = pendulum(network, weights), []
 
     def loss(theta):
         member, value, slope = model(weights=theta), 1e-5 * theta @ theta, 2e-5 * theta
@@ -87,7 +83,7 @@ def draw(truth, learnt, measured, losses, path):
     energy.set(ylabel="$H - H_0$", xlabel="t")
     entropy.set(ylabel="$S$", xlabel="t")
     p = np.linspace(-2.0, 2.0, 200)
-    rates.plot(p, true_rate(p), label="true")
+    rates.plot(p, true_rate(p, truth.parameters["weights"]), label="true")
     rates.plot(p, [network(x, learnt.parameters["weights"]) for x in p], "--", label="learnt")
     rates.set(xlabel="momentum", ylabel=r"$\gamma$")
     figure.suptitle(f"loss {losses[0]:.3f} → {min(losses):.5f}")

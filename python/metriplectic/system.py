@@ -211,7 +211,8 @@ class System:
         self._verified = False
         self._noise = None if noise is None else float(noise)
         n = space.velocities
-        self._takes_time = "t" in _names(energy)
+        moving = [energy, *(f for f in (poisson, almost_poisson, friction) if callable(f))]
+        self._takes_time = any("t" in _names(f) for f in moving)
         self._definition = Definition(
             factors=[(factor.kind, factor.directions, list(factor.constants)) for factor in space.factors],
             parameters=self._flat_names(),
@@ -248,7 +249,7 @@ class System:
             values[name] = new
         other = object.__new__(System)
         other.__dict__.update(self.__dict__)
-        other._values = values
+        other._values, other._verified = values, False
         other._raw = self._raw.at(other._theta())
         return other
 
@@ -273,7 +274,8 @@ class System:
             raise TypeError(f"{name}: a function is expected, not {type(f).__name__}")
         space, values = self.space, self._values
         names = _names(f)
-        first = 2 if covector else 1
+        has_covector = covector and len(names) > 1 and names[1] != "t" and names[1] not in values
+        first = 2 if has_covector else 1
         for extra in names[first:]:
             if extra != "t" and extra not in values and not _has_default(f, extra):
                 known = ", ".join(["t", *values])
@@ -285,7 +287,7 @@ class System:
             positional = [space.shaped(x)]
             if covector:
                 w = rest.pop(0)
-                if len(names) > 1:
+                if has_covector:
                     positional.append(w)
             named = dict(zip(["t", *values], rest))
             return f(*positional, **{key: named[key] for key in asked})

@@ -133,12 +133,16 @@ def test_systems_that_are_dropped_leave_no_memory():
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
 
 
-def test_a_long_recording_runs():
-    def energy(x):
-        total = 0.0
-        for k in range(20_000):
-            total = total + np.sin(x[0] + 1e-3 * k) * x[1]
-        return 1e-4 * total + 0.5 * x @ x
+def test_a_recording_of_a_million_instructions_runs():
+    from metriplectic._trace import Op, Program
 
-    run = mp.System(mp.R(2), energy=energy, poisson="symplectic").run([0.1, 0.2], t=0.05, h=0.05)
-    assert run.certificate.keeps_energy
+    # ½q² + ½p² + a function of q that is a million sines of another one.
+    count = 1_000_000
+    ops = [Op.MULTIPLICATION, Op.MULTIPLICATION, Op.ADDITION, Op.SCALE] + [Op.SIN] * count + [Op.MULTIPLY_ADD]
+    operands = [(0, 0, 0), (1, 1, 0), (3, 4, 0), (5, 0, 0), (0, 0, 0)]
+    operands += [(7 + k, 0, 0) for k in range(count - 1)] + [(7, 7 + count - 1, 6)]
+    constants = np.zeros(len(ops))
+    constants[3] = 0.5
+    energy = Program(3, np.array(ops, dtype=np.uint32), np.array(operands, dtype=np.uint32), constants, [3 + len(ops) - 1])
+    run = mp.System(mp.R(2), energy=energy, poisson="symplectic").run([0.1, 0.2], h=0.1, steps=1, method="dp5")
+    assert run.certificate.keeps_energy and run.y[-1, 0] == pytest.approx(0.1 * np.cos(0.1) + 0.2 * np.sin(0.1), abs=2e-3)

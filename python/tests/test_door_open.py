@@ -116,3 +116,33 @@ def test_a_closed_system_with_noise_keeps_its_energy():
     )
     run = system.run([0.4, -1.0, 0.3], h=0.02, steps=300, method="dp5", seed=2)
     assert run.certificate.keeps_energy and (np.diff(run.entropy) < 0).any()
+
+
+def test_a_friction_may_depend_on_time():
+    def friction(x, w, t):
+        return [(0.2 * (1.0 + np.sin(t)), np.stack([0.0 * w[0], -w[2], w[1]]))]
+
+    system = mp.System(
+        mp.R(3), energy=lambda x: 0.5 * x[1] ** 2 + 0.5 * x[0] ** 2 + x[2], entropy=lambda x: x[2], friction=friction,
+        poisson=np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 0]]),
+    )
+    run = system.run([1.0, 0.0, 0.0], t=5.0, tol=1e-10)
+    exact = solve_ivp(
+        lambda t, x: [x[1], -x[0] - 0.2 * (1 + np.sin(t)) * x[1]], (0.0, 5.0), [1.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13
+    ).y[:, -1]
+    assert np.allclose(run.y[-1, :2], exact, atol=1e-7) and run.certificate.keeps_energy
+
+
+def test_contacts_without_a_covector_may_have_the_time_second():
+    system = mp.System(
+        mp.R(1), energy=lambda p: 0.5 * p @ p, friction=None, poisson="none",
+        baths={"air": (1.0, lambda p, t: [(0.3 * t, np.ones(1))])},
+    )
+    # p' = −0.3 t p.
+    run = system.run([1.0], t=2.0, tol=1e-10)
+    assert run.y[-1, 0] == pytest.approx(np.exp(-0.6), abs=1e-8)
+
+
+def test_ports_and_baths_on_spheres_are_refused():
+    with pytest.raises(mp.ModelError, match="spheres"):
+        mp.System(mp.sphere(2), energy=lambda n: n[2], work={"push": lambda n: n})

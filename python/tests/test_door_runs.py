@@ -116,6 +116,12 @@ def test_verification_names_the_law():
     sound = body().report(START)
     assert sound.verdict is None and len(sound.laws) > 3
     assert body().verified(START).run(START, t=1.0).certificate.verified_before
+    # A certificate is that of the values of the parameters.
+    damped = pendulum().verified([1.0, 0.0, 0.0])
+    assert damped.run([0.5, 0.0, 0.0], t=1.0).certificate.verified_before
+    assert not damped(gamma=0.5).run([0.5, 0.0, 0.0], t=1.0).certificate.verified_before
+    with pytest.raises(mp.ModelError, match="destroys entropy"):
+        damped(gamma=-0.5).run([0.5, 0.4, 0.0], t=1.0)
 
 
 def test_messages_speak_python():

@@ -91,6 +91,9 @@ fn with_parameters<F>(
     counts!(by_count)
 }
 
+/// The derivatives of the time of an event and of the state there, along the start and along the parameters, or why there are none.
+type AlongEvent = Result<[Vec<f64>; 4], String>;
+
 /// A run with its tangent, as arrays.
 #[derive(Debug)]
 struct Tangent {
@@ -101,7 +104,7 @@ struct Tangent {
     along_start: Vec<f64>,
     along_parameters: Vec<f64>,
     ledger: Vec<(String, Vec<f64>, Vec<f64>)>,
-    events: Vec<(String, f64, Result<[Vec<f64>; 4], String>)>,
+    events: Vec<(String, f64, AlongEvent)>,
     certificate: Box<metriplectic::integrators::Certificate>,
     sensitivity: Sensitivity,
     lengths: [usize; 2],
@@ -575,7 +578,7 @@ pub(crate) fn evaluate<'py>(
     for (k, row) in x.rows().into_iter().enumerate() {
         tape.evaluate(&row.to_vec(), &mut all[k * count..][..count]);
     }
-    Ok(all.into_pyarray(py).reshape([rows, count])?)
+    all.into_pyarray(py).reshape([rows, count])
 }
 
 /// The values of a recorded function at rows of numbers, and their derivatives.

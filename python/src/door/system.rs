@@ -85,6 +85,9 @@ impl Chosen {
     }
 }
 
+/// Rows of a law, its residual, what is allowed and the worst state; the verdict; and the text.
+type Reported = (Vec<(&'static str, f64, f64, Vec<f64>)>, Option<String>, String);
+
 /// A run that is asked for.
 pub(crate) struct Request {
     pub(crate) start: Vec<f64>,
@@ -96,7 +99,7 @@ pub(crate) struct Request {
 /// A run that did not reach its end: why, and what there is of it.
 struct Failed {
     error: PyErr,
-    partial: Option<Output>,
+    partial: Option<Box<Output>>,
 }
 
 /// Runs a system of one kind by one method.
@@ -119,7 +122,7 @@ fn run<F: Kind, M: Stepper<F>>(
             let message = format!("{cause} ({steps} steps were taken and are in `partial`)");
             Err(Failed {
                 error: RunError::new_err(in_python(&message)),
-                partial: Some(Output::of(flow, names, &trajectory)),
+                partial: Some(Box::new(Output::of(flow, names, &trajectory))),
             })
         }
         Err(error) => Err(Failed { error: of_run(&error), partial: None }),
@@ -304,7 +307,7 @@ impl RawSystem {
         })
     }
 
-    /// The system at other values of its parameters. Nothing is recorded again.
+    /// The system at other values of its parameters, which is not verified. No function is recorded again.
     fn at(&self, theta: Vec<f64>) -> PyResult<Self> {
         if theta.len() != self.theta.len() {
             return Err(bad(format!(
@@ -319,7 +322,7 @@ impl RawSystem {
             theta: theta.into(),
             surroundings: self.surroundings.clone(),
             noise: self.noise,
-            is_verified: self.is_verified,
+            is_verified: false,
             names: Arc::clone(&self.names),
         })
     }
@@ -355,7 +358,7 @@ impl RawSystem {
         py: Python<'_>,
         start: PyReadonlyArray1<'_, f64>,
         time: f64,
-    ) -> PyResult<(Vec<(&'static str, f64, f64, Vec<f64>)>, Option<String>, String)> {
+    ) -> PyResult<Reported> {
         let start = start.as_array().to_vec();
         let report = caught(|| py.detach(|| self.reported(&start, time)))?;
         let text =
@@ -385,7 +388,7 @@ impl RawSystem {
             parts.values(*t, &row.to_vec(), &mut values);
             all.extend(values);
         }
-        Ok(all.into_pyarray(py).reshape([states.nrows(), sizes.laws])?)
+        all.into_pyarray(py).reshape([states.nrows(), sizes.laws])
     }
 
     /// Runs the system, without the interpreter.

@@ -127,6 +127,7 @@ def test_views_and_copies_are_those_of_numpy() -> None:
         row[0] = -1.0
         fancy[:] = 99.0
         number += 5.0
+        number **= 2
         y[1:3] *= y[:2].copy()
         zero = y[2, ...]
         zero += 1.0
@@ -300,6 +301,8 @@ def test_names_say_what_an_argument_is() -> None:
     one = read(lambda p, *, gamma: (p, gamma))
     assert (one.state, one.by_factors, one.time, one.covector, one.parameters) == (("p",), False, False, False, ("gamma",))
     assert one.call("state", parameters=both) == ("state", 2.0)
+    timed = read(lambda x, w, t: x, covector=True)
+    assert timed.time and timed.covector and not timed.parameters and not timed.by_factors
     assert read(lambda p, k, t, gamma: (p, k, t, gamma)).call(1, t=5.0, parameters=both) == (1, 3.0, 5.0, 2.0)
     assert read(lambda x, w, gamma: (x, w, gamma), covector=True).call(1, w=4.0, parameters=both) == (1, 4.0, 2.0)
     assert read(lambda x, i=7: (x, i)).call(1) == (1, 7)
@@ -315,7 +318,7 @@ def test_names_say_what_an_argument_is() -> None:
     for f, options, text in (
         (lambda p, mu: p, {}, "has the argument `mu`, which is no parameter; after the state, there are t, gamma, k"),
         (lambda p, *, mu: p, {}, "`mu`"), (lambda p, gamma, mu: p, {}, "`mu`"), (lambda x, w: x, {}, "`w`"),
-        (lambda a, b, c: a, {"factors": 2}, "`c`"), (lambda a, b: a, {"factors": 3}, "the space has 3 factors"),
+        (lambda a, b, c: a, {"factors": 2}, "`c`"), (lambda a, *, b: a, {"factors": 2}, "`b`"), (lambda a, b: a, {"factors": 3}, "the space has 3 factors"),
         (lambda *x: x, {}, "*x"), (lambda t: t, {}, "no argument for the state"), (lambda: 1.0, {}, "no argument for the state"),
     ):  # fmt: skip
         with pytest.raises(TraceError) as caught:

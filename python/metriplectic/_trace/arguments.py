@@ -9,7 +9,7 @@ A function names its arguments, and their names say what they are:
   order. ``lambda x: ..`` on a product takes the tuple of factors, ``lambda q, p: ..`` takes them one by one.
 
 An argument with a default that is none of these keeps its default, which is a constant of the recording: ``lambda x, i=i: x[i]``. The state
-comes first; the others may come in any order, before or after ``*``: ``lambda p, gamma: ..`` and ``lambda p, *, gamma: ..`` are the same.
+stands before ``*``; the others stand anywhere: ``lambda p, gamma: ..`` and ``lambda p, *, gamma: ..`` are the same.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def arguments(
                 if one.kind is not one.KEYWORD_ONLY and one.kind is not one.POSITIONAL_ONLY:
                     keywords.update(later.name for later in found[found.index(one) + 1 :])
                 continue
-            if one.kind is one.KEYWORD_ONLY or len(order) > len(state):
+            if one.kind is one.KEYWORD_ONLY:
                 raise _unknown(name, one.name, parameters, covector)
             state.append(one.name)
         if one.kind is one.KEYWORD_ONLY:

@@ -367,8 +367,6 @@ class SymbolNumber(Symbolic):
 
     def _register(self, other: Any) -> int | None:
         """The register of a plain operand; `None` if NumPy must look at it."""
-        if self.is_condition:
-            return None
         kind = type(other)
         if kind is SymbolNumber and other.recording is self.recording and not other.is_condition:
             register: int = other.id
@@ -414,7 +412,7 @@ class SymbolNumber(Symbolic):
         return self._after(_DIV, np.true_divide, other)
 
     def __pow__(self, other: Any) -> Any:
-        if self.is_condition or type(other) not in (int, float):
+        if type(other) not in (int, float):
             return np.power(self, other)
         return SymbolNumber(self.recording, self.recording.power_of_one(self.id, float(other)))
 

@@ -65,6 +65,8 @@ def test_a_function_of_two_arrays_has_the_numbers_of_numpy(name: str) -> None:
         if name in ("hypot", "logaddexp") and abs(value) in (1e300, 1e-300, np.inf):
             continue
         x = np.unique(a)
+        if name == "power" and value == 0.5:  # Some versions take the root of −0 and −∞, some the power.
+            x = x[(x != 0) & (x != -np.inf)]
         for one in (lambda x: number(f(x, value)), lambda x: number(f(value, x))):
             got, want = recorded(one, x)
             np.testing.assert_allclose(got, want, rtol=1e-14, err_msg=f"{name} with {value}")
@@ -128,7 +130,7 @@ CALLS: list[Callable[..., Any]] = [
     lambda x: np.ones((2, 2), like=x) @ x, lambda x: np.array([x[0, 0], 2.0], like=x), lambda x: np.identity(2, like=x) @ x, lambda x: x.astype(float), lambda x: np.copy(x), lambda x: +x,
     lambda x: np.array([x[0, 0], x[1, 1]]) ** 2, lambda x: np.exp(np.array([[x[0, 0], x[0, 1]], [x[1, 0], x[1, 1]]])), lambda x: np.array([x[0, 0], x[1, 1]]).std(), lambda x: np.array([x[0], x[1]]) @ SPARSE, lambda x: np.array(x) + 1,
     lambda x: np.linalg.norm(np.array([x[0, 0], x[1, 1]])), lambda x: np.array([x[0, 0], x[1, 1]]).mean(), lambda x: np.arctan2(np.array([x[0, 0]]), 2.0), lambda x: np.sqrt(np.asarray(x) ** 2),
-    lambda x: np.cross(np.array([x[0, 0], 0, 1]), [1, 2, 3]), lambda x: np.outer(np.array([x[0, 0], 2]), x[1]), lambda x: x.real + x.imag, lambda x: np.real(x), lambda x: divmod(1, 2)[1] * x,
+    lambda x: np.cross(np.stack([x[0, 0], 0.0, 1.0]), [1.0, 2, 3]), lambda x: np.outer(np.array([x[0, 0], 2]), x[1]), lambda x: x.real + x.imag, lambda x: np.real(x), lambda x: divmod(1, 2)[1] * x,
     lambda x: -x, lambda x: 3 - x, lambda x: 2 / x, lambda x: [1.0, 2, 3] * x, lambda x: np.float64(2) * x[0, 0], lambda x: np.float32(2) ** x, lambda x: x[0, 0] ** x[0, 2], lambda x: 2 ** x[0, 0],
     lambda x: x[0, 0] - 1, lambda x: 1 - x[0, 0], lambda x: 1 / x[0, 0], lambda x: x[0, 0] / 3, lambda x: x[0, 0] / x[0, 1], lambda x: x[0, 0] * A, lambda x: A - x[0, 0], lambda x: True * x, lambda x: x[0, 0] * True,
 ]  # fmt: skip
@@ -163,7 +165,7 @@ def test_linear_algebra_of_small_matrices(n: int) -> None:
         slopes = np.linalg.det(matrix) * np.linalg.inv(matrix).T  # Jacobi
         np.testing.assert_allclose(jacobian(program, matrix.ravel())[0], slopes.ravel(), rtol=1e-9, atol=1e-11)
     batch = rng.normal(size=(3, n, n))
-    for f in (np.linalg.det, np.linalg.inv, lambda a: np.linalg.solve(a, np.ones((n, 1)))):
+    for f in (np.linalg.det, np.linalg.inv, lambda a: np.linalg.solve(a, np.ones((3, n, 2)))):
         got, want = recorded(f, batch)
         np.testing.assert_allclose(got, want, rtol=1e-8, atol=1e-10)
 
@@ -218,6 +220,7 @@ def test_a_bound_costs_one_instruction() -> None:
         lambda x: np.exp(np.array([x[0, 0], 1.0])), lambda x: np.linalg.det(np.array([[x[0, 0]]])),
         lambda x: 1 if x[0, 0] else 2, lambda x: not x[0, 0], lambda x: x[0, 0] and 1, lambda x: 0 < x[0, 0] < 1, lambda x: int(x.sum()),
         lambda x: x[0, 0].is_integer(), lambda x: float(np.array([x[0, 0]])[0]), lambda x: (x[0, 0] + 1j).real, lambda x: np.frompyfunc(abs, 1, 1)(x),
+        lambda x: np.linalg.solve(np.stack([x[:, :2]] * 2), np.ones((2, 2))),
     ],
 )  # fmt: skip
 def test_what_is_not_recorded_is_refused(f: Callable[..., Any]) -> None:

@@ -286,8 +286,14 @@ def _solved(matrix: Any, columns: list[list[Any]]) -> list[list[Any]]:
 
 
 def solve(recording: Recording, a: Any, b: Any) -> Any:
-    """Solutions of ``a x = b``, with NumPy's rule: ``b`` is a vector if it has one axis, otherwise it has columns."""
+    """Solutions of ``a x = b``: ``b`` is a vector, or it has as many axes as ``a`` and holds columns."""
     matrix, right = _square(recording, a, "solve"), symbol(recording, b)
+    if 1 < right.ndim < matrix.ndim:
+        # Version 2 of NumPy takes it for a matrix, and version 1 for a stack of vectors.
+        raise recording.refusal(
+            f"np.linalg.solve is called with the shapes {matrix.shape} and {right.shape}, which mean other things in other versions of NumPy",
+            "write b[..., None] for vectors, and b[None, ...] for a matrix",
+        )
     n = matrix.shape[-1]
     if right.ndim == 0 or right.shape[-1 if right.ndim == 1 else -2] != n:
         raise _mismatch(recording, matrix.ids, right.ids)

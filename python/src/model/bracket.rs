@@ -218,7 +218,7 @@ impl Poisson {
                 };
                 match other {
                     Some(tensor) => Ok(tensor),
-                    None if space.is_flat() && n % 2 == 0 => {
+                    None if space.is_flat() && n.is_multiple_of(2) => {
                         let k = n / 2;
                         let pairs = (0..k).flat_map(|i| [(i, i + k, 1.0), (i + k, i, -1.0)]);
                         affine(pairs.collect(), Vec::new())

@@ -200,11 +200,11 @@ impl Rub {
             RubKind::Field(field) => field.tensor(t, x, w, to),
             RubKind::Metric { .. } => {
                 let n = w.len();
-                with_numbers(2 * n, |room| {
+                with_numbers(3 * n, |room| {
+                    let (still, room) = room.split_at_mut(n);
                     let (axis, column) = room.split_at_mut(n);
                     for k in 0..n {
                         axis[k] = 1.0;
-                        let still = &vec![0.0; n];
                         self.apply(around, t, (x, still), [w, axis], column)?;
                         axis[k] = 0.0;
                         (0..n).for_each(|i| to[i * n + k] = column[i]);
@@ -380,9 +380,9 @@ fn linearise_metric(
     with_numbers(n, |slope| {
         let kappa = factor.jet(&around.layout, t, x, slope);
         for i in 0..n {
-            for k in 0..n {
+            for (k, slope) in slope.iter().enumerate() {
                 let at = i * n + k;
-                jet.along_x[at] = kappa * jet.along_x[at] + jet.value[i] * slope[k];
+                jet.along_x[at] = kappa * jet.along_x[at] + jet.value[i] * slope;
                 jet.along_w[at] *= kappa;
                 jet.tensor[at] *= kappa;
             }

@@ -58,7 +58,7 @@ impl Inner<'_> {
             Self::Canonical => {}
             Self::Units(units) => to.iter_mut().zip(units).for_each(|(to, unit)| *to *= unit),
             Self::Factored { l } => {
-                triangular::solve(to.len(), &Rows { n: to.len(), numbers: l }, &mut Column(to))
+                triangular::solve(to.len(), &Rows { n: to.len(), numbers: l }, &mut Column(to));
             }
         }
     }

@@ -225,7 +225,7 @@ impl Space {
     fn each(&self, f: &mut dyn FnMut(&Arc<dyn Factor>)) {
         match &self.kind {
             SpaceKind::Euclidean(n) | SpaceKind::LieDual(n, _) => {
-                f(&(Arc::new(Flat(*n)) as Arc<dyn Factor>))
+                f(&(Arc::new(Flat(*n)) as Arc<dyn Factor>));
             }
             SpaceKind::Sphere(_, factor) => f(factor),
             SpaceKind::Rotations => f(&(Arc::new(Typed::new(Rotations)) as Arc<dyn Factor>)),

@@ -288,10 +288,15 @@ fn an_energy_in_time_keeps_the_laws() {
 fn invariants_are_projected_out_of_the_friction() {
     let (space, x) = spaces().swap_remove(1);
     let invariants = vec![(Kind::Casimir, law(4, 0.9)), (Kind::Momentum, law(4, 3.1))];
-    for metric in [None, Some(metric(4))] {
+    let of_metric = Friction::Metric { factor: None };
+    // It does not annihilate the invariants by itself.
+    let recorded = Friction::Recorded(recorded_friction(4, 4));
+    for (metric, friction) in
+        [(None, of_metric.clone()), (Some(metric(4)), of_metric), (None, recorded)]
+    {
         let definition = Definition {
             invariants: invariants.clone(),
-            friction: Friction::Metric { factor: None },
+            friction,
             entropy: Some(law(4, 1.9)),
             metric,
             ..still(space.clone())

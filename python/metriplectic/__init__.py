@@ -13,7 +13,7 @@ once, and runs need no interpreter::
 
 from . import jax
 from ._metriplectic import Error, ModelError, RunError, SpanError, TraceError
-from ._trace import array
+from ._trace import array, supported
 from .fitting import Estimate, Fit, fit
 from .run import Certificate, FoundEvent, Run, Tangent
 from .spaces import R, SO3, Space, cotangent_so3, half_line, lie_dual, product, se3_dual, so3_dual, sphere
@@ -25,5 +25,5 @@ __version__ = "0.1.0"
 __all__ = [
     "Certificate", "Error", "Estimate", "Event", "Fit", "FoundEvent", "ModelError", "R", "Report", "Run", "RunError", "SO3", "Space",
     "SpanError", "Sweep", "System", "Tangent", "TraceError", "array", "cotangent_so3", "fit", "half_line", "jax", "lie_dual", "product",
-    "se3_dual", "so3_dual", "sphere", "sweep",
+    "se3_dual", "so3_dual", "sphere", "supported", "sweep",
 ]

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _metriplectic as _door
 from ._metriplectic import ModelError, RunError
-from ._trace import Program, array, trace
+from ._trace import Program, arguments, array, trace
 from .run import Certificate, Run, Tangent
 from .spaces import Space
 
@@ -273,24 +273,12 @@ class System:
         if not callable(f):
             raise TypeError(f"{name}: a function is expected, not {type(f).__name__}")
         space, values = self.space, self._values
-        names = _names(f)
-        has_covector = covector and len(names) > 1 and names[1] != "t" and names[1] not in values
-        first = 2 if has_covector else 1
-        for extra in names[first:]:
-            if extra != "t" and extra not in values and not _has_default(f, extra):
-                known = ", ".join(["t", *values])
-                raise TypeError(f"{name}: the argument {extra!r} is no parameter; there are {known}. Name it in `parameters=`")
-        asked = [extra for extra in names[first:] if extra == "t" or extra in values]
+        taken = arguments(f, parameters=values, factors=len(space.shapes), covector=covector, name=name)
 
         def recorded(x, *rest):
-            rest = list(rest)
-            positional = [space.shaped(x)]
-            if covector:
-                w = rest.pop(0)
-                if has_covector:
-                    positional.append(w)
+            w, rest = (rest[0], rest[1:]) if covector else (None, rest)
             named = dict(zip(["t", *values], rest))
-            return f(*positional, **{key: named[key] for key in asked})
+            return taken.call(space.shaped(x), w=w, t=named["t"], parameters=named)
 
         shapes = [(space.entries,)] + ([(space.velocities,)] if covector else []) + [()]
         shapes += [value.shape for value in values.values()]
@@ -334,8 +322,8 @@ class System:
             if number in (0.0, 1.0):
                 return ("metric", None) if number else ("none", None)
             return "metric", self._record(lambda x: number, "friction")
-        names = _names(friction)
-        if len(names) < 2 or names[1] == "t" or names[1] in self._values:
+        factors = len(self.space.shapes)
+        if not arguments(friction, parameters=self._values, factors=factors, covector=True, name="friction").covector:
             return "metric", self._record(friction, "friction")
         # A list of contacts, or a matrix: the recording says which.
         contacts: list[int] = []
@@ -756,10 +744,6 @@ def _names(f: Function) -> list[str]:
     except (TypeError, ValueError):
         return ["x"]
     return [p.name for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-
-
-def _has_default(f: Function, name: str) -> bool:
-    return inspect.signature(f).parameters[name].default is not inspect.Parameter.empty
 
 
 def _listed(part: Any) -> list[Any]:

@@ -81,7 +81,7 @@ def test_a_function_that_writes_into_its_argument_is_refused():
     (dict(space=3), TypeError), (dict(energy=3.0), TypeError), (dict(friction=-1.0), mp.ModelError),
     (dict(friction=float("nan")), mp.ModelError), (dict(poisson=np.eye(2)), ValueError), (dict(poisson="Poisson"), ValueError),
     (dict(poisson=np.zeros((3, 3)), almost_poisson=np.zeros((3, 3))), ValueError), (dict(parameters={"t": 1.0}), ValueError),
-    (dict(parameters={"a": np.nan}), mp.ModelError), (dict(energy=lambda p, a: p @ p), TypeError),
+    (dict(parameters={"a": np.nan}), mp.ModelError), (dict(energy=lambda p, a: p @ p), mp.TraceError),
     (dict(friction=lambda p, w: w), mp.TraceError), (dict(metric=np.eye(4)), ValueError),
 ])
 def test_a_part_that_makes_no_sense(arguments, error):

@@ -249,3 +249,13 @@ def test_observables_are_functions_of_the_recorded_states():
     })
     assert np.allclose(run.observables["speed"], np.abs(run.y[:, 1]))
     assert np.allclose(run.observables["pair"], np.stack([run.y[:, 0] + run.t, 0.3 * run.y[:, 1]], axis=1))
+
+
+def test_functions_of_a_product_take_its_factors_one_by_one():
+    space = mp.sphere(2) * mp.R(1)
+    taken = mp.System(space, energy=lambda m, s: m[2] + np.exp(s[0]), entropy=lambda m, s: s[0], friction=lambda m, s, rate: rate,
+                      parameters={"rate": 0.3})
+    tuples = mp.System(space, energy=lambda x: x[0][2] + np.exp(x[1][0]), entropy=lambda x: x[1][0], friction=0.3)
+    start = [[0.6, 0.0, 0.8], [0.1]]
+    runs = [system.run(start, t=2.0, tol=1e-9) for system in (taken, tuples)]
+    assert np.allclose(runs[0].y, runs[1].y, rtol=0.0, atol=1e-14)

@@ -1,6 +1,7 @@
 //! Runs of systems of tapes beside those of the same systems in the types of the library.
 
 use metriplectic::dynamics::bracket::{AreaForm, Zero};
+use metriplectic::dynamics::FieldDissipation;
 use metriplectic::dynamics::exchange::Contact;
 use metriplectic::dynamics::system::Point;
 use metriplectic::dynamics::{
@@ -15,7 +16,7 @@ use metriplectic::manifolds::{
     Euclidean, HalfLine, LieDual, Manifold, Product, Rotations, Sphere, WeylMidpoint,
 };
 use metriplectic::recording::Recorded as Number;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector3, Vector6, vector};
+use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector1, Vector3, Vector4, Vector6, vector};
 use num_dual::DualNum;
 
 use super::laws::tape;
@@ -324,4 +325,48 @@ fn a_ring_of_three_hundred_variables_runs() {
     let verified = system.verified(&waves(n)).unwrap();
     let run = WeylMidpoint.run(&verified, waves(n).into(), Span::steps(1e-3, 1)).unwrap();
     assert!(run.certificate().max_relative_energy_error() < 1e-14);
+}
+
+/// `x ×` on a sphere, with a further number.
+fn turns<D: Scalar>(x: &[D]) -> Vec<D> {
+    let o = D::from(0.0);
+    vec![o, -x[2], x[1], o, x[2], o, -x[0], o, -x[1], x[0], o, o, o, o, o, o]
+}
+
+/// `K = (w·w) A − w ⊗ Aw − Aw ⊗ w + (w·Aw) 1` with a diagonal `A(x)`.
+fn rubs<D: Scalar>(x: &[D], w: &[D]) -> Vec<D> {
+    let a: Vec<D> = x.iter().map(|x| *x * *x + 0.5).collect();
+    let sum = |of: &dyn Fn(usize) -> D| (0..4).fold(D::from(0.0), |sum, i| sum + of(i));
+    let (ww, waw) = (sum(&|i| w[i] * w[i]), sum(&|i| w[i] * w[i] * a[i]));
+    let entry = |k: usize| {
+        let (i, j) = (k / 4, k % 4);
+        let outer = -(w[i] * w[j] * (a[i] + a[j]));
+        if i == j { outer + ww * a[i] + waw } else { outer }
+    };
+    (0..16).map(entry).collect()
+}
+
+fn of_spin_with_energy<D: Scalar>(x: &[D]) -> D {
+    field(&x[..3]) - x[2] * 0.4 + x[3]
+}
+
+#[test]
+fn recorded_tensors_on_curved_factors_run_as_in_types() {
+    type State = (Vector3<Real>, Vector1<Real>);
+    let list = |(n, s): &State| [n.x, n.y, n.z, s.x];
+    let typed = System::on(Product(Sphere::<2>::round(), HalfLine))
+        .bracket(Poisson::field(move |x: &State| Matrix4::from_row_slice(&turns(&list(x)))))
+        .dissipation(FieldDissipation(move |x: &State, w: &Vector4<Real>| {
+            Matrix4::from_row_slice(&rubs(&list(x), w.as_slice()))
+        }))
+        .energy(move |x: &State| of_spin_with_energy(&list(x)))
+        .entropy(|(_, s): &State| s.x.ln())
+        .build()
+        .unwrap();
+    let space = Space::product(vec![Space::sphere(2).unwrap(), Space::half_line()]).unwrap();
+    let bracket = Bracket::Recorded { tape: tape(5, |x| turns(&x[..4])), is_poisson: true };
+    let friction = Friction::Recorded(tape(9, |x| rubs(&x[..4], &x[4..8])));
+    let own = defined(space, of_spin_with_energy, Some(&|x| x[3].ln()), bracket);
+    let start = (vector![0.6, 0.0, 0.8], vector![0.7]);
+    agree("a spin by tensors", &typed, &start, 0.02, Definition { friction, ..own });
 }

@@ -8,7 +8,6 @@ use metriplectic_equations::{
 use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector,
-    differential_at, hessian_at,
 };
 use metriplectic_manifolds::in_numbers::{
     PathsInNumbers, column, point, put, put_matrix, with_entries, write,
@@ -166,7 +165,7 @@ struct Displaced<'a, M: Space> {
 
 impl<M: Space> WithField<M> for Displaced<'_, M> {
     fn visit(&mut self, f: &impl ScalarField<M>) {
-        put(&differential_at(f, self.x, &self.q), self.df);
+        put(&f.differential_at(self.x, &self.q), self.df);
     }
 }
 
@@ -179,7 +178,7 @@ struct Bent<'a, M: Space> {
 
 impl<M: Space> WithField<M> for Bent<'_, M> {
     fn visit(&mut self, f: &impl ScalarField<M>) {
-        put_matrix(&hessian_at(f, self.x, &self.q), self.hf);
+        put_matrix(&f.hessian_at(self.x, &self.q), self.hf);
     }
 }
 

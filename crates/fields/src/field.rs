@@ -23,7 +23,8 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
 /// ```
 ///
 /// Laws ([`laws::scalar_field`](crate::laws::scalar_field)): 1. `jet1` and `jet2` agree with `at`;
-/// 2. `f(φ(tv)) − f − t df·v` falls like `t²`; 3. with the Hessian term, like `t³`.
+/// 2. `f(φ(tv)) − f − t df·v` falls like `t²`; 3. with the Hessian term, like `t³`; 4. `differential_at` and
+/// `hessian_at` agree with `at` off the centre of the chart.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a scalar field on `{M}`",
     label = "expected a function of one point that returns one number",
@@ -80,6 +81,44 @@ pub trait ScalarField<M: Space> {
         }
         Jet2 { value, df, hf }
     }
+
+    /// Computes the differential at the real coordinates `q` in the frame of the chart at `x`, which need not be its
+    /// centre, in `⌈n/2⌉` evaluations.
+    #[inline]
+    fn differential_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Vector<M> {
+        let n = M::Dim::LEN;
+        let mut df = Vector::<M>::zero();
+        for i in (0..n).step_by(2) {
+            let f = self.at_real(&seeded::<M>(x, q, i, i + 1));
+            df[i] = f.eps1;
+            if i + 1 < n {
+                df[i + 1] = f.eps2;
+            }
+        }
+        df
+    }
+
+    /// Computes the Hessian at the real coordinates `q` of the chart at `x`, which need not be its centre, in `n(n+1)/2`
+    /// evaluations.
+    #[inline]
+    fn hessian_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Matrix<M> {
+        let mut hf = Matrix::<M>::zeros();
+        for i in 0..M::Dim::LEN {
+            for j in i..M::Dim::LEN {
+                hf[(i, j)] = self.at_real(&seeded::<M>(x, q, i, j)).eps1eps2;
+                hf[(j, i)] = hf[(i, j)];
+            }
+        }
+        hf
+    }
+}
+
+/// The point `φ_x(q + ε₁ e_i + ε₂ e_j)`. An index beyond the dimension seeds nothing.
+#[inline]
+pub fn seeded<M: Space>(x: &M::Point<f64>, q: &Vector<M>, i: usize, j: usize) -> M::Point<Real> {
+    let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+    let seed = |k| Real::new(q[k], part(k, i), part(k, j), 0.0);
+    M::chart(x, &Vector::<M, Real>::from_index(seed))
 }
 
 /// A number is the constant field with this value.
@@ -100,6 +139,16 @@ impl<M: Space> ScalarField<M> for f64 {
     #[inline]
     fn jet2(&self, _: &M::Point<f64>) -> Jet2<M> {
         Jet2 { value: *self, df: Vector::<M>::zero(), hf: Matrix::<M>::zeros() }
+    }
+
+    #[inline]
+    fn differential_at(&self, _: &M::Point<f64>, _: &Vector<M>) -> Vector<M> {
+        Vector::<M>::zero()
+    }
+
+    #[inline]
+    fn hessian_at(&self, _: &M::Point<f64>, _: &Vector<M>) -> Matrix<M> {
+        Matrix::<M>::zeros()
     }
 }
 

@@ -1,14 +1,16 @@
 //! The laws of a field, and the function that checks them.
 
 use crate::{
-    BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector, hessian,
+    BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
+    differential, hessian,
 };
 
 /// Checks a scalar field at `x` along the chart direction `v`:
 ///
 /// 1. `jet1` and `jet2` agree with `at` and with nested dual numbers to round-off;
 /// 2. `f(φ(tv)) − f − t df·v` falls like `t²`;
-/// 3. `f(φ(tv)) − f − t df·v − ½t² vᵀHf v` falls like `t³`.
+/// 3. `f(φ(tv)) − f − t df·v − ½t² vᵀHf v` falls like `t³`;
+/// 4. `differential_at` and `hessian_at` agree with nested dual numbers at `v/16` in the chart at `x`.
 ///
 /// # Errors
 ///
@@ -42,7 +44,16 @@ pub fn scalar_field<M: Space>(
     let remainder = |t: f64, second: f64| one_sided(t, second) + one_sided(-t, second);
     let round_off = 100.0 * f64::EPSILON * (size + slope.abs() + curvature.abs());
     taylor_order("df is the derivative of the field", 2.0, round_off, |t| remainder(t, 0.0))?;
-    taylor_order("Hf is the second derivative", 3.0, round_off, |t| remainder(t, curvature))
+    taylor_order("Hf is the second derivative", 3.0, round_off, |t| remainder(t, curvature))?;
+
+    let q = *v * (1.0 / 16.0);
+    let there = ChartPoint::<M> { base: x.clone(), q };
+    let (df, hf) = (differential(f, &there), hessian(f, &there));
+    let (slope, bend) = (f.differential_at(x, &q), f.hessian_at(x, &q));
+    let size = size + df.magnitude() + hf.max_abs();
+    let bound = 400.0 * f64::EPSILON * M::Dim::LEN as f64 * size;
+    BrokenLaw::unless("differential_at is the differential", (df - slope).magnitude(), bound)?;
+    BrokenLaw::unless("hessian_at is the Hessian", (hf - bend).max_abs(), bound)
 }
 
 /// Checks that `remainder(t)` falls at least like `t^order` over `t = 2⁻⁴ … 2⁻¹²`, as far as it

@@ -46,10 +46,10 @@ pub mod stack;
 pub mod triangular;
 
 pub use column::{Column, dot, length, power_of_two};
-pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
+pub use differential::{differential, hessian, jacobian};
 pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
-pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
+pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes, seeded};
 pub use metriplectic_equations::{BrokenLaw, NotPositive};
 pub use piecewise::Piecewise;
 pub use scalar::{Real, Scalar};

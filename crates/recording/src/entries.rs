@@ -1,6 +1,6 @@
 //! The entries of a point, at any scalar.
 
-use metriplectic_fields::{Column, Dimension, Matrix, Scalar, Square, Vector};
+use metriplectic_fields::{Column, Dimension, Matrix, Real, Scalar, Square, Vector, seeded};
 use metriplectic_manifolds::{
     Chart, Euclidean, HalfLine, LieDual, Manifold, Product, Rotations, Sphere, Times,
 };
@@ -12,7 +12,8 @@ use nalgebra::{Matrix3, SVector};
 ///
 /// Laws: 1. [`point`](Self::point) undoes [`list`](Self::list); 2. the entries are those of
 /// [`Manifold::entries`], in their order, [`COUNT`](Self::COUNT) of them; 3. [`pull_back`](Self::pull_back) is the transpose
-/// of the derivative of the chart, and [`bend`](Self::bend) its second derivative.
+/// of the derivative of the chart, and [`bend`](Self::bend) its second derivative; so are [`pull_back_at`](Self::pull_back_at)
+/// and [`bend_at`](Self::bend_at) off the centre.
 pub trait PointEntries: Manifold {
     /// The number of entries.
     const COUNT: usize;
@@ -33,39 +34,71 @@ pub trait PointEntries: Manifold {
         if Self::IS_TRANSLATION {
             return Vector::<Self>::from_index(|i| w[i]);
         }
-        let mut df = Vector::<Self>::zero();
-        let (n, seeded) = (<Self::Dim as Dimension>::LEN, Self::seeds(x));
-        for i in (0..n).step_by(2) {
-            let mut weights = w.iter();
-            Self::list(&seeded(i, i + 1), &mut |entry| {
-                let w = weights.next().copied().unwrap_or(f64::NAN);
-                df[i] += entry.eps1 * w;
-                if i + 1 < n {
-                    df[i + 1] += entry.eps2 * w;
-                }
-            });
-        }
-        df
+        pulled::<Self>(&Self::seeds(x), w)
     }
 
     /// Computes `Σ_e w_e ∂²x_e/∂qⁱ∂qʲ`, what the curvature of the chart at `x` adds to a Hessian.
+    #[inline]
     fn bend(x: &Self::Point<f64>, w: &[f64]) -> Matrix<Self> {
-        let mut hf = Matrix::<Self>::zeros();
         if Self::IS_TRANSLATION {
-            return hf;
+            return Matrix::<Self>::zeros();
         }
-        let (n, seeded) = (<Self::Dim as Dimension>::LEN, Self::seeds(x));
-        for j in 0..n {
-            for i in 0..=j {
-                let (mut sum, mut weights) = (0.0, w.iter());
-                Self::list(&seeded(i, j), &mut |entry| {
-                    sum += entry.eps1eps2 * weights.next().copied().unwrap_or(f64::NAN);
-                });
-                (hf[(i, j)], hf[(j, i)]) = (sum, sum);
-            }
-        }
-        hf
+        bent::<Self>(&Self::seeds(x), w)
     }
+
+    /// Computes the same sum `Σ_e w_e ∂x_e/∂qⁱ` at the coordinates `q` of the chart at `x`, off its centre.
+    #[inline]
+    fn pull_back_at(x: &Self::Point<f64>, q: &Vector<Self>, w: &[f64]) -> Vector<Self> {
+        if Self::IS_TRANSLATION {
+            return Vector::<Self>::from_index(|i| w[i]);
+        }
+        pulled::<Self>(&|i, j| seeded::<Self>(x, q, i, j), w)
+    }
+
+    /// Computes the same sum `Σ_e w_e ∂²x_e/∂qⁱ∂qʲ` at the coordinates `q` of the chart at `x`, off its centre.
+    #[inline]
+    fn bend_at(x: &Self::Point<f64>, q: &Vector<Self>, w: &[f64]) -> Matrix<Self> {
+        if Self::IS_TRANSLATION {
+            return Matrix::<Self>::zeros();
+        }
+        bent::<Self>(&|i, j| seeded::<Self>(x, q, i, j), w)
+    }
+}
+
+/// `Σ_e w_e ∂x_e/∂qⁱ`, from the points `φ(q + ε₁ e_i + ε₂ e_j)`.
+#[inline]
+fn pulled<M: PointEntries>(
+    seeded: &impl Fn(usize, usize) -> M::Point<Real>,
+    w: &[f64],
+) -> Vector<M> {
+    let mut df = Vector::<M>::zero();
+    let n = M::Dim::LEN;
+    for i in (0..n).step_by(2) {
+        let mut weights = w.iter();
+        M::list(&seeded(i, i + 1), &mut |entry| {
+            let w = weights.next().copied().unwrap_or(f64::NAN);
+            df[i] += entry.eps1 * w;
+            if i + 1 < n {
+                df[i + 1] += entry.eps2 * w;
+            }
+        });
+    }
+    df
+}
+
+/// `Σ_e w_e ∂²x_e/∂qⁱ∂qʲ`, from the points `φ(q + ε₁ e_i + ε₂ e_j)`.
+fn bent<M: PointEntries>(seeded: &impl Fn(usize, usize) -> M::Point<Real>, w: &[f64]) -> Matrix<M> {
+    let mut hf = Matrix::<M>::zeros();
+    for j in 0..M::Dim::LEN {
+        for i in 0..=j {
+            let (mut sum, mut weights) = (0.0, w.iter());
+            M::list(&seeded(i, j), &mut |entry| {
+                sum += entry.eps1eps2 * weights.next().copied().unwrap_or(f64::NAN);
+            });
+            (hf[(i, j)], hf[(j, i)]) = (sum, sum);
+        }
+    }
+    hf
 }
 
 macro_rules! columns {
@@ -155,5 +188,17 @@ impl<A: PointEntries + Times<B>, B: PointEntries> PointEntries for Product<A, B>
     fn bend((a, b): &Self::Point<f64>, w: &[f64]) -> Matrix<Self> {
         let (left, right) = w.split_at(A::COUNT);
         Self::block(&A::bend(a, left), &B::bend(b, right))
+    }
+
+    #[inline]
+    fn pull_back_at((a, b): &Self::Point<f64>, q: &Vector<Self>, w: &[f64]) -> Vector<Self> {
+        let ((qa, qb), (left, right)) = (Self::split(q), w.split_at(A::COUNT));
+        Self::join(&A::pull_back_at(a, &qa, left), &B::pull_back_at(b, &qb, right))
+    }
+
+    #[inline]
+    fn bend_at((a, b): &Self::Point<f64>, q: &Vector<Self>, w: &[f64]) -> Matrix<Self> {
+        let ((qa, qb), (left, right)) = (Self::split(q), w.split_at(A::COUNT));
+        Self::block(&A::bend_at(a, &qa, left), &B::bend_at(b, &qb, right))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Dimension, Jet1, Jet2, Real, Scalar, ScalarField};
+use metriplectic_fields::{Dimension, Jet1, Jet2, Matrix, Real, Scalar, ScalarField, Vector};
 
 use crate::{PointEntries, Tape, TapeField};
 
@@ -94,6 +94,24 @@ where
             self.tape.jet2(x)
         } else {
             ScalarField::<M>::jet2(&self.closure, x)
+        }
+    }
+
+    #[inline]
+    fn differential_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Vector<M> {
+        if const { M::Dim::LEN >= GRADIENT_FROM } {
+            self.tape.differential_at(x, q)
+        } else {
+            ScalarField::<M>::differential_at(&self.closure, x, q)
+        }
+    }
+
+    #[inline]
+    fn hessian_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Matrix<M> {
+        if const { M::Dim::LEN >= HESSIAN_FROM } {
+            self.tape.hessian_at(x, q)
+        } else {
+            ScalarField::<M>::hessian_at(&self.closure, x, q)
         }
     }
 }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use crate::{PointEntries, RecordingError, Tape, room};
 use metriplectic_fields::{
-    Dimension, Form, Jet1, Jet2, MatrixField, Real, Scalar, ScalarField, Square,
+    Dimension, Form, Jet1, Jet2, Matrix, MatrixField, Real, Scalar, ScalarField, Square, Vector,
+    seeded,
 };
 
 /// A tape as a scalar field: a function of the entries of a point.
@@ -108,39 +109,75 @@ impl<M: PointEntries> ScalarField<M> for TapeField<M> {
     }
 
     fn jet1(&self, x: &M::Point<f64>) -> Jet1<M> {
-        room::with(|room| {
-            self.forward(x, &mut room.values);
-            let output = self.output();
-            self.tape.backward(&room.values, &mut room.weights, |bar| bar[output] = 1.0);
-            let df = M::pull_back(x, &room.weights[..M::COUNT]);
-            Jet1 { value: room.values[output], df }
-        })
+        let (value, df) = self.gradient(x, |w| M::pull_back(x, w));
+        Jet1 { value, df }
     }
 
     fn jet2(&self, x: &M::Point<f64>) -> Jet2<M> {
         let (n, seeded) = (M::Dim::LEN, M::seeds(x));
+        self.second(x, |j| seeded(j, n), |w| M::pull_back(x, w), |w| M::bend(x, w))
+    }
+
+    fn differential_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Vector<M> {
+        self.gradient(&M::chart(x, q), |w| M::pull_back_at(x, q, w)).1
+    }
+
+    fn hessian_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Matrix<M> {
+        let seed = |j| seeded::<M>(x, q, j, M::Dim::LEN);
+        let pulled = |w: &[f64]| M::pull_back_at(x, q, w);
+        self.second(&M::chart(x, q), seed, pulled, |w| M::bend_at(x, q, w)).hf
+    }
+}
+
+impl<M: PointEntries> TapeField<M> {
+    /// Computes the value and the differential at a point, which `pulled` makes of the derivatives by its entries.
+    #[inline]
+    fn gradient(
+        &self,
+        at: &M::Point<f64>,
+        pulled: impl FnOnce(&[f64]) -> Vector<M>,
+    ) -> (f64, Vector<M>) {
+        room::with(|room| {
+            self.forward(at, &mut room.values);
+            let output = self.output();
+            self.tape.backward(&room.values, &mut room.weights, |bar| bar[output] = 1.0);
+            (room.values[output], pulled(&room.weights[..M::COUNT]))
+        })
+    }
+
+    /// Computes value, differential and Hessian at a point, of which `seeded(j)` is the point with its derivatives along the
+    /// `j`-th direction of a chart. The others are the transposed derivative of the chart and what its curvature adds.
+    #[inline]
+    fn second(
+        &self,
+        at: &M::Point<f64>,
+        seeded: impl Fn(usize) -> M::Point<Real>,
+        pulled: impl Fn(&[f64]) -> Vector<M>,
+        bend: impl FnOnce(&[f64]) -> Matrix<M>,
+    ) -> Jet2<M> {
+        let n = M::Dim::LEN;
         let seed = |j: usize, put: &mut dyn FnMut(usize, f64)| {
             if M::IS_TRANSLATION {
                 return put(j, 1.0);
             }
             let mut input = 0;
-            M::list(&seeded(j, n), &mut |entry: Real| {
+            M::list(&seeded(j), &mut |entry: Real| {
                 put(input, entry.eps1);
                 input += 1;
             });
         };
         self.tape.second_order(
-            |inputs| fill::<M, f64>(x, inputs),
+            |inputs| fill::<M, f64>(at, inputs),
             |at| {
                 let w = at.gradient();
-                let mut hf = M::bend(x, w);
+                let mut hf = bend(w);
                 at.along(n, seed, |j, column| {
-                    let column = M::pull_back(x, column);
+                    let column = pulled(column);
                     for i in 0..n {
                         hf[(i, j)] += column[i];
                     }
                 });
-                Jet2 { value: at.value(), df: M::pull_back(x, w), hf }
+                Jet2 { value: at.value(), df: pulled(w), hf }
             },
         )
     }

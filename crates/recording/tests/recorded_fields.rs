@@ -42,7 +42,11 @@ fn each_derivative_comes_from_the_faster_one() {
             let hessian = calls(&|field| assert!(field.jet2(&x).is_finite()));
             let value = calls(&|field| assert!(field.at::<f64>(&x).is_finite()));
             let dual = calls(&|field| assert!(field.at(&x.map(Dual64::from)).re.is_finite()));
-            assert_eq!(value, 1);
+            let off = calls(&|field| {
+                assert!(metriplectic_fields::Column::is_finite(&field.differential_at(&x, &x)));
+            });
+            let bend = calls(&|field| assert!(field.hessian_at(&x, &x).norm().is_finite()));
+            assert_eq!((value, off, bend), (1, gradient, hessian));
             assert_eq!(dual, gradient);
             (gradient, hessian)
         }};

@@ -26,6 +26,19 @@ fn check<M: PointEntries>(space: &M, tape: &TapeField<M>, closure: &impl ScalarF
         });
         let broken = laws::scalar_field(tape, &x, &v);
         assert_eq!(broken.is_ok(), laws::scalar_field(closure, &x, &v).is_ok(), "{broken:?}");
+        let (ours, theirs) = (tape.differential_at(&x, &v), closure.differential_at(&x, &v));
+        let (bend, expected) = (tape.hessian_at(&x, &v), closure.hessian_at(&x, &v));
+        for i in 0..M::Dim::LEN {
+            let size = 1.0 + expected[(i, i)].abs();
+            assert!((ours[i] - theirs[i]).abs() < 1e-12 * size, "{ours:?} {theirs:?}");
+            for j in 0..M::Dim::LEN {
+                let (a, b) = (bend[(i, j)], expected[(i, j)]);
+                assert!(
+                    (a - b).abs() < 1e-11 * size,
+                    "off the centre, entry {i} {j}: {a:e} and {b:e}"
+                );
+            }
+        }
         let (ours, theirs) = (tape.jet2(&x), closure.jet2(&x));
         for i in 0..M::Dim::LEN {
             assert!((ours.df[i] - theirs.df[i]).abs() < 1e-12, "{:?} {:?}", ours.df, theirs.df);

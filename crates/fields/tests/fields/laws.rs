@@ -2,7 +2,7 @@
 
 use metriplectic_fields::laws::scalar_field;
 use metriplectic_fields::{BrokenLaw, Column, Jet1, Jet2, Real, Scalar, ScalarField, Vector};
-use nalgebra::{Vector2, vector};
+use nalgebra::{Matrix2, Vector2, vector};
 use num_dual::DualNum;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -113,6 +113,33 @@ impl ScalarField<Plain<2>> for WrongSlopeInJet1 {
 #[test]
 fn a_faster_jet1_with_a_wrong_slope_breaks_its_law() {
     assert_eq!(verdict(&WrongSlopeInJet1), Err("jet1 and jet2 agree on df"));
+}
+
+/// Faster derivatives off the centre that are those of the centre.
+struct AtTheCentre {
+    differential: bool,
+}
+
+impl ScalarField<Plain<2>> for AtTheCentre {
+    fn at<D: Scalar>(&self, x: &Vector2<D>) -> D {
+        wave(x)
+    }
+
+    fn differential_at(&self, x: &Vector2<f64>, q: &Vector2<f64>) -> Vector2<f64> {
+        let at = if self.differential { *x } else { x + q };
+        ScalarField::<Plain<2>>::jet1(self, &at).df
+    }
+
+    fn hessian_at(&self, x: &Vector2<f64>, _: &Vector2<f64>) -> Matrix2<f64> {
+        ScalarField::<Plain<2>>::jet2(self, x).hf
+    }
+}
+
+#[test]
+fn faster_derivatives_of_the_centre_break_the_law_off_it() {
+    let broken = |differential| verdict(&AtTheCentre { differential });
+    assert_eq!(broken(true), Err("differential_at is the differential"));
+    assert_eq!(broken(false), Err("hessian_at is the Hessian"));
 }
 
 /// A faster answer at the scalar of closures that drops the mixed part.

@@ -1,8 +1,7 @@
 //! The mean value discrete gradient, or averaged vector field.
 
 use metriplectic_fields::{
-    ChartPoint, Column, Matrix, Scalar, ScalarField, Square, Vector, differential, differential_at,
-    hessian_at,
+    ChartPoint, Column, Matrix, Scalar, ScalarField, Square, Vector, differential,
 };
 use metriplectic_manifolds::{Manifold, StepPath, StepPathJet};
 use num_dual::Dual64;
@@ -49,7 +48,7 @@ impl DiscreteGradient for MeanValue {
         let (start, end) = segment(x, path);
         GAUSS.iter().fold(Vector::<M>::zero(), |mean, &(s, weight)| {
             let q = start * (1.0 - s) + end * s;
-            mean + differential_at(f, &path.z.base, &q) * weight
+            mean + f.differential_at(&path.z.base, &q) * weight
         })
     }
 
@@ -69,8 +68,8 @@ impl DiscreteGradient for MeanValue {
         let (mut mean, mut slope) = (Vector::<M>::zero(), Matrix::<M>::zeros());
         for &(s, weight) in &GAUSS {
             let q = start * (1.0 - s) + end * s;
-            mean += differential_at(f, &path.z, &q) * weight;
-            slope += hessian_at(f, &path.z, &q) * (weight * s);
+            mean += f.differential_at(&path.z, &q) * weight;
+            slope += f.hessian_at(&path.z, &q) * (weight * s);
         }
         (mean, slope * dend)
     }

@@ -50,6 +50,35 @@ impl Covariance {
         Self { matrix, unseen, flattest, fraction }
     }
 
+    /// Computes the covariance of some unknowns at fixed values of the others, which have NaN and are in no direction.
+    pub(crate) fn of_some(jacobian: &DMatrix<f64>, free: &[usize], variance: f64) -> Self {
+        let n = jacobian.ncols();
+        if free.len() == n {
+            return Self::of(jacobian, variance);
+        }
+        let place = |i: usize| free.iter().position(|j| *j == i);
+        let mut all = Self {
+            matrix: DMatrix::from_element(n, n, f64::NAN),
+            unseen: Vec::new(),
+            flattest: DVector::zeros(n),
+            fraction: 1.0,
+        };
+        if free.is_empty() {
+            return all;
+        }
+        let some = Self::of(&jacobian.select_columns(free), variance);
+        for (k, &i) in free.iter().enumerate() {
+            for (l, &j) in free.iter().enumerate() {
+                all.matrix[(i, j)] = some.matrix[(k, l)];
+            }
+        }
+        let spread =
+            |along: &DVector<f64>| DVector::from_fn(n, |i, _| place(i).map_or(0.0, |k| along[k]));
+        all.unseen = some.unseen.iter().map(spread).collect();
+        (all.flattest, all.fraction) = (spread(&some.flattest), some.fraction);
+        all
+    }
+
     /// Returns whether the data do not see a combination of the unknowns.
     pub fn is_singular(&self) -> bool {
         self.fraction < UNSEEN

@@ -56,6 +56,49 @@ pub enum FitError {
         /// The names of the family.
         known: Vec<&'static str>,
     },
+    /// There is no parameter at this place.
+    #[error("there is no parameter {index}; the family has {known:?}, counted from 0")]
+    UnknownIndex {
+        /// The place that was asked for.
+        index: usize,
+        /// The names of the family.
+        known: Vec<&'static str>,
+    },
+    /// The bounds of a parameter are not an interval.
+    #[error(
+        "the bounds of {name} are {lower} and {upper}; the first one has to be the smaller number. Infinity stands for no bound, and \
+         `free` fixes a parameter"
+    )]
+    Bounds {
+        /// The parameter.
+        name: &'static str,
+        /// The lower bound.
+        lower: f64,
+        /// The upper bound.
+        upper: f64,
+    },
+    /// The guess of a parameter is outside of its bounds; it is not moved.
+    #[error(
+        "the guess of {name} is {value}, and its bounds are {lower} and {upper}; guess a number between them"
+    )]
+    OutOfBounds {
+        /// The parameter.
+        name: &'static str,
+        /// The guess.
+        value: f64,
+        /// The lower bound.
+        lower: f64,
+        /// The upper bound.
+        upper: f64,
+    },
+    /// The scale of a robust loss is not a positive number.
+    #[error(
+        "the scale of the loss is {scale}; it must be a positive finite number, the residual from which on one counts less"
+    )]
+    Scale {
+        /// The scale that was given.
+        scale: f64,
+    },
     /// A parameter that is to stay positive has a guess that is not.
     #[error(
         "the guess of {name} is {value}, and it was said to be positive; guess a positive number"

@@ -11,11 +11,13 @@ use metriplectic_integrators::tangent::{Fittable, LinearisedAlong};
 use metriplectic_integrators::{Flow, Schedule, Stepper, Systems};
 use nalgebra::{SMatrix, SVector};
 
+use crate::bounds::{Bounds, WITHOUT, Which};
 use crate::error::FitError;
 use crate::fitted::{FLAT, Fitted, Parts, Stop};
 use crate::least_squares::Squares;
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::model::{Failure, ManifoldOf, Measured, Model, PointOf, Residuals};
+use crate::robust::Robust;
 use crate::systems::Observed;
 use crate::unknowns::{Names, Unknown, unknowns};
 
@@ -219,6 +221,8 @@ pub(crate) struct Options<const K: usize> {
     noise: Option<[f64; K]>,
     free: Names,
     positive: Names,
+    bounds: Bounds,
+    robust: Option<Robust>,
     iterations: u64,
     solver: LevenbergMarquardt,
 }
@@ -231,6 +235,8 @@ impl<const K: usize> Default for Options<K> {
             noise: None,
             free: Names::All,
             positive: Names::None,
+            bounds: Bounds::default(),
+            robust: None,
             iterations: 100,
             solver: LevenbergMarquardt::default(),
         }
@@ -296,6 +302,82 @@ impl<Y, F, X, const P: usize, const K: usize> FitBuilder<Y, F, X, P, K> {
     /// Fits the logarithms of all parameters.
     pub fn positive_all(self) -> Self {
         self.with(|options| Options { positive: Names::All, ..options })
+    }
+
+    /// Keeps a parameter, given by its name or by its place, between two numbers, each of which may be infinite. No run is taken outside
+    /// of them. A guess outside is [refused](FitError::OutOfBounds) and not moved; bounds that are no interval are
+    /// [refused](FitError::Bounds) too.
+    ///
+    /// A parameter that ends at a bound beyond which the residuals still fall has the bits of the bound, and no standard error: it is
+    /// NaN, and [`Estimate::held`](crate::Estimate::held) and the text of the fit say so. The errors of the others are those of a fit with
+    /// the parameter fixed there.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::Family;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_fitting::{Bound, Fit};
+    /// # use metriplectic_integrators::{DormandPrince8, Span};
+    /// # use metriplectic_manifolds::Euclidean;
+    /// # use nalgebra::{Vector1, Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // x' = −k x, with the energy y; measured is the decay of k = 1.
+    /// let decay = Family::on(Euclidean::<2>)
+    ///     .parameters(["rate"])
+    ///     .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y)
+    ///     .entropy(|x: &Vector2<Real>, t: &Vector1<Real>| -(x.x * x.x * t.x * 0.5))
+    ///     .build()?;
+    /// let times = [0.5, 1.0, 1.5, 2.0];
+    /// let fit = Fit::of(&decay)
+    ///     .observe(|x: &Vector2<Real>| vector![x.x])
+    ///     .data(&times, &times.map(|t| vector![f64::exp(-t)]))
+    ///     .start_at(vector![1.0, 0.0])
+    ///     .between("rate", 0.0, 0.8)
+    ///     .run(DormandPrince8, Span::until(2.0).tolerance(1e-8), vector![0.5])?;
+    /// assert_eq!((fit.parameters[0], fit.estimates[0].held), (0.8, Some(Bound::Upper)));
+    /// assert!(fit.to_string().contains("held at its upper bound"));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn between(self, which: impl Into<Which>, lower: f64, upper: f64) -> Self {
+        let which = which.into();
+        self.with(|mut options| {
+            options.bounds.set(which, [lower, upper]);
+            options
+        })
+    }
+
+    /// Minimises a loss that outliers move little in place of the sum of squares, with a scale in units of the noise, or of the data if
+    /// no noise is given. Standard errors are those of Huber (1973), and need no known noise. A scale that is not positive and finite is
+    /// [refused](FitError::Scale).
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::Family;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_fitting::{Fit, Robust};
+    /// # use metriplectic_integrators::{DormandPrince8, Span};
+    /// # use metriplectic_manifolds::Euclidean;
+    /// # use nalgebra::{Vector1, Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let decay = Family::on(Euclidean::<2>)
+    /// #     .parameters(["rate"])
+    /// #     .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y)
+    /// #     .entropy(|x: &Vector2<Real>, t: &Vector1<Real>| -(x.x * x.x * t.x * 0.5))
+    /// #     .build()?;
+    /// let times = [0.5, 1.0, 1.5, 2.0];
+    /// let mut data = times.map(|t| vector![f64::exp(-t)]);
+    /// data[2].x += 1.0; // a slip of the pen
+    /// let fit = Fit::of(&decay)
+    ///     .observe(|x: &Vector2<Real>| vector![x.x])
+    ///     .data(&times, &data)
+    ///     .start_at(vector![1.0, 0.0])
+    ///     .robust(Robust::Cauchy(0.01))
+    ///     .run(DormandPrince8, Span::until(2.0).tolerance(1e-8), vector![0.9])?;
+    /// assert!((fit.parameters[0] - 1.0).abs() < 1e-3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn robust(self, loss: Robust) -> Self {
+        self.with(|options| Options { robust: Some(loss), ..options })
     }
 
     /// Replaces the options of the solver.
@@ -500,6 +582,16 @@ where
     }
 }
 
+/// The bounds of unknowns and of so many coordinates; none if all are infinite.
+fn bounds(unknowns: &[Unknown], coordinates: usize) -> Vec<[f64; 2]> {
+    let mut bounds: Vec<[f64; 2]> = unknowns.iter().map(Unknown::range).collect();
+    if bounds.iter().flatten().all(|bound| bound.is_infinite()) {
+        return Vec::new();
+    }
+    bounds.extend(vec![WITHOUT; coordinates]);
+    bounds
+}
+
 impl<const K: usize> Options<K> {
     fn measured(&self) -> Measured<K> {
         let (times, rows) = (self.times.clone(), self.rows.clone());
@@ -507,7 +599,7 @@ impl<const K: usize> Options<K> {
     }
 
     fn unknowns(&self, known: &[&'static str], guess: &[f64]) -> Result<Vec<Unknown>, FitError> {
-        unknowns(known, guess, [&self.free, &self.positive])
+        unknowns(known, guess, [&self.free, &self.positive], &self.bounds)
     }
 
     /// Finds the least sum of squares from a guess, with so many coordinates of the start beside the parameters.
@@ -531,6 +623,8 @@ impl<const K: usize> Options<K> {
         if solver.limits.is_empty() {
             solver.limits = unknowns.iter().map(limit).collect();
         }
+        solver.bounds = bounds(unknowns, coordinates);
+        solver.robust = self.robust.or(solver.robust);
         let executor = Executor::new(model, solver)
             .configure(|state| state.param(phi).max_iters(self.iterations));
         let found = executor.run().map_err(|error| FitError::Solver(error.to_string()))?;
@@ -546,13 +640,20 @@ impl<const K: usize> Options<K> {
             }
             _ => Stop::Unfinished,
         };
+        let held = found.solver.held(&squares, &best);
+        let free = best.len() - held.iter().flatten().count();
         // A promise that no trial has kept, or that none was left for.
-        let variance = squares.sum() / (data - best.len()) as f64;
+        let variance = match found.solver.robust {
+            Some(loss) => loss.spread(squares.residuals.as_slice(), free).scaled,
+            None => squares.sum() / (data - free) as f64,
+        };
         let variance = variance.max(ROUNDED * ROUNDED * measured.mean_square());
         let runs = |evaluations: u64| evaluations * model.runs();
-        if found.solver.relevant(&squares).promised() > FLAT * variance {
-            let (runs, chi_squared) =
-                (usize::try_from(runs(evaluations)).unwrap_or(usize::MAX), squares.sum());
+        if found.solver.relevant(&squares, &best).promised() > FLAT * variance {
+            let (runs, chi_squared) = (
+                usize::try_from(runs(evaluations)).unwrap_or(usize::MAX),
+                found.solver.sum(&squares),
+            );
             return Err(FitError::NotConverged { runs, chi_squared, parameters });
         }
         Ok(Fitted::new(Parts {
@@ -564,6 +665,8 @@ impl<const K: usize> Options<K> {
             noise_is_known: self.noise.is_some(),
             runs: runs(evaluations + 1),
             stop,
+            held,
+            robust: found.solver.robust,
         }))
     }
 
@@ -582,6 +685,9 @@ impl<const K: usize> Options<K> {
             if let Some(column) = numbers.iter().position(|number| !number.is_finite()) {
                 return Err(FitError::NotFinite { row, column, value: numbers[column] });
             }
+        }
+        if let Some(loss) = self.robust.or(self.solver.robust) {
+            loss.check()?;
         }
         let bad = |sigma: &f64| !(*sigma > 0.0 && sigma.is_finite());
         match self.noise.and_then(|noise| noise.iter().position(bad).map(|k| (k, noise[k]))) {

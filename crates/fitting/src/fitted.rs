@@ -4,8 +4,10 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::bounds::{Bound, WITHOUT};
 use crate::covariance::Covariance;
 use crate::least_squares::Squares;
+use crate::robust::Robust;
 use crate::unknowns::Unknown;
 
 /// An estimate of a parameter.
@@ -16,22 +18,27 @@ pub struct Estimate {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Its standard error, in the same unit.
+    /// Its standard error, in the same unit; NaN if a bound [holds](Self::held) it.
     pub standard_error: f64,
     /// Whether its logarithm was fitted.
     pub positive: bool,
     /// Whether the data do not tell it from its bound, zero: its logarithm is uncertain by more than 1.
     pub at_bound: bool,
+    /// The bounds that were [asked for](crate::FitBuilder::between); infinite without them.
+    pub bounds: [f64; 2],
+    /// The bound that holds it: it is there to the last bit, and the residuals still fall beyond. It has no standard error then.
+    pub held: Option<Bound>,
 }
 
 impl Estimate {
-    /// The interval of `q` standard errors; `θ̂ exp(±q s/θ̂)` if the logarithm was fitted.
+    /// The interval of `q` standard errors; `θ̂ exp(±q s/θ̂)` if the logarithm was fitted. It ends at the bounds, and is NaN if one of
+    /// them [holds](Self::held) the estimate.
     pub fn interval(&self, q: f64) -> [f64; 2] {
-        let Self { value, standard_error, positive, .. } = *self;
+        let Self { value, standard_error, positive, bounds: [lower, upper], .. } = *self;
         if positive {
-            [-q, q].map(|q| value * (q * standard_error / value).exp())
+            [-q, q].map(|q| (value * (q * standard_error / value).exp()).clamp(lower, upper))
         } else {
-            [-q, q].map(|q| value + q * standard_error)
+            [-q, q].map(|q| (value + q * standard_error).clamp(lower, upper))
         }
     }
 }
@@ -66,19 +73,25 @@ pub struct Fitted {
     pub parameters: Vec<f64>,
     /// The entries of the start.
     pub start: Vec<f64>,
-    /// The sum of squares of residuals in units of the noise; of residuals themselves if it is not known.
+    /// The sum that was minimised: of squares of residuals in units of the noise, or of residuals themselves if it is not known; with a
+    /// robust loss that of `C² ρ(r²/C²)`, which is twice the cost of SciPy.
     pub chi_squared: f64,
-    /// The numbers that were measured less the unknowns.
+    /// The numbers that were measured less the unknowns that no bound holds.
     pub degrees: usize,
-    /// The noise that the residuals show, `√(χ²/degrees)`: near 1 if it was given and the model is right.
+    /// The noise that the residuals show, `√(χ²/degrees)`: near 1 if it was given and the model is right. With a robust loss it is the one
+    /// with which a fit by squares would have these standard errors.
     pub noise: f64,
+    /// The loss, if it was not that of squares.
+    pub robust: Option<Robust>,
+    /// The residuals beyond the scale of the loss; 0 without one.
+    pub beyond: usize,
     /// Whether the noise was given.
     pub noise_is_known: bool,
     /// The runs that were made.
     pub runs: u64,
     /// The end of the iterations.
     pub ending: Ending,
-    /// The covariance of the unknowns: parameters, or their logarithms.
+    /// The covariance of the unknowns: parameters, or their logarithms. Those that a bound holds have NaN.
     pub covariance: Covariance,
 }
 
@@ -92,6 +105,8 @@ pub(crate) struct Parts<'a> {
     pub(crate) noise_is_known: bool,
     pub(crate) runs: u64,
     pub(crate) stop: Stop,
+    pub(crate) held: Vec<Option<Bound>>,
+    pub(crate) robust: Option<Robust>,
 }
 
 /// The reason for which the iterations stopped.
@@ -105,24 +120,46 @@ pub(crate) enum Stop {
 
 impl Fitted {
     pub(crate) fn new(parts: Parts<'_>) -> Self {
-        let Parts { unknowns, phi, squares, parameters, start, noise_is_known, runs, stop } = parts;
-        let chi_squared = squares.sum();
-        let degrees = squares.residuals.len() - phi.len();
-        let variance = chi_squared / degrees as f64;
+        let Parts {
+            unknowns,
+            phi,
+            squares,
+            parameters,
+            start,
+            noise_is_known,
+            runs,
+            stop,
+            held,
+            robust,
+        } = parts;
+        let held = |i: usize| held.get(i).copied().flatten();
+        let free: Vec<usize> = (0..phi.len()).filter(|&i| held(i).is_none()).collect();
+        let residuals = squares.residuals.as_slice();
+        let degrees = residuals.len() - free.len();
+        let chi_squared = robust.map_or_else(|| squares.sum(), |loss| loss.sum(residuals));
+        let variance = match robust {
+            Some(loss) => loss.spread(residuals, free.len()).variance,
+            None => chi_squared / degrees as f64,
+        };
+        let is_unit = noise_is_known && robust.is_none();
         let covariance =
-            Covariance::of(&squares.jacobian, if noise_is_known { 1.0 } else { variance });
+            Covariance::of_some(&squares.jacobian, &free, if is_unit { 1.0 } else { variance });
         let estimates = (phi.iter().enumerate())
             .map(|(i, &phi)| {
                 let error = covariance.standard_error(i);
                 match unknowns.get(i) {
                     Some(unknown) => {
                         let value = unknown.parameter(phi);
+                        let held = held(i);
+                        let is_wide = error > 1.0 || error.is_nan();
                         Estimate {
                             name: unknown.name,
                             value,
                             standard_error: error * unknown.slope(value),
                             positive: unknown.positive,
-                            at_bound: unknown.positive && (error > 1.0 || error.is_nan()),
+                            at_bound: unknown.positive && held.is_none() && is_wide,
+                            bounds: unknown.bounds,
+                            held,
                         }
                     }
                     None => Estimate {
@@ -131,11 +168,16 @@ impl Fitted {
                         standard_error: error,
                         positive: false,
                         at_bound: false,
+                        bounds: WITHOUT,
+                        held: None,
                     },
                 }
             })
             .collect();
         let noise = variance.sqrt();
+        let beyond = robust.map_or(0, |loss| {
+            residuals.iter().filter(|residual| residual.abs() > loss.scale()).count()
+        });
         let ending = match stop {
             Stop::Unfinished if covariance.fraction <= NARROW => Ending::FlatValley,
             Stop::Converged | Stop::Unfinished => Ending::Minimum,
@@ -148,6 +190,8 @@ impl Fitted {
             degrees,
             noise,
             noise_is_known,
+            robust,
+            beyond,
             runs,
             ending,
             covariance,
@@ -185,8 +229,18 @@ impl Fitted {
 
 impl fmt::Display for Fitted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Estimate { name, value, standard_error, at_bound, .. } in &self.estimates {
-            if *at_bound {
+        for Estimate { name, value, standard_error, at_bound, held, .. } in &self.estimates {
+            if let Some(bound) = held {
+                let side = match bound {
+                    Bound::Lower => "lower",
+                    Bound::Upper => "upper",
+                };
+                writeln!(
+                    f,
+                    "{name:>12} = {value:.9} is held at its {side} bound: the residuals still fall beyond it, so it has no standard \
+                     error, and those of the others are at this value"
+                )?;
+            } else if *at_bound {
                 writeln!(
                     f,
                     "{name:>12} is at its bound: the data do not tell {value:.3e} from zero"
@@ -220,8 +274,22 @@ impl fmt::Display for Fitted {
                  them, or measure what tells them apart"
             )?;
         }
-        let Self { chi_squared, degrees, noise, runs, .. } = self;
-        if self.noise_is_known {
+        let Self { chi_squared, degrees, noise, runs, beyond, .. } = self;
+        if let Some(loss) = self.robust {
+            if noise.is_infinite() {
+                writeln!(
+                    f,
+                    "so many residuals are beyond the scale of the loss that nothing says how they scatter: there are no standard \
+                     errors, take a larger scale"
+                )?;
+            }
+            let all = degrees + self.estimates.iter().filter(|one| one.held.is_none()).count();
+            write!(
+                f,
+                "{loss:?}: Σ C²ρ = {chi_squared:.4e}, {beyond} of {all} residuals are beyond the scale, noise {noise:.3e} by {degrees} \
+                 degrees of freedom, {runs} runs"
+            )
+        } else if self.noise_is_known {
             write!(f, "χ² = {chi_squared:.4e} for {degrees} degrees of freedom, {runs} runs")
         } else {
             write!(f, "noise {noise:.3e} by {degrees} degrees of freedom, {runs} runs")
@@ -237,7 +305,8 @@ mod tests {
     /// Two columns that differ by 10⁻⁴ of their length, with residuals that no step makes smaller.
     #[test]
     fn a_valley_without_an_end_is_a_sentence() {
-        let unknowns = ["a", "b"].map(|name| Unknown { index: 0, name, positive: false });
+        let unknowns =
+            ["a", "b"].map(|name| Unknown { index: 0, name, positive: false, bounds: WITHOUT });
         let fitted = |apart: f64, stop: Stop| {
             let column = |i: usize| 1.0 + 0.1 * i as f64;
             let jacobian =
@@ -252,6 +321,8 @@ mod tests {
                 noise_is_known: false,
                 runs: 9,
                 stop,
+                held: Vec::new(),
+                robust: None,
             })
         };
         let flat = fitted(1e-4, Stop::Unfinished);

@@ -5,7 +5,10 @@ use argmin::core::{
 };
 use nalgebra::{DMatrix, DVector};
 
+use crate::bounds::{Bound, WITHOUT, held};
 use crate::least_squares::{LeastSquares, Squares};
+use crate::projected::InBox;
+use crate::robust::Robust;
 use crate::trust_region::Linear;
 
 /// The method of Levenberg (1944) and Marquardt (1963) with a trust region (Moré 1978), as a solver for argmin's
@@ -22,6 +25,10 @@ use crate::trust_region::Linear;
 /// `Δ` is doubled where the linear model is good and divided by four where it is not; `λ ≥ 0` is the one of this radius. So the damped
 /// step *is* the best one in the trust region, and another step in the same region, such as the dogleg of Powell (1970), predicts a
 /// smaller reduction.
+///
+/// Within [`bounds`](Self::bounds) an unknown that a step would take out of them is put on its bound, to the last bit, and the others take
+/// the best step beside it (`projected.rs`). A [`robust`](Self::robust) loss replaces `|r|²` by `Σ C² ρ(r²/C²)`, of which the squares
+/// `|J̃ δ + r̃|²` are the model.
 ///
 /// ```
 /// use argmin::core::{Executor, State};
@@ -66,6 +73,11 @@ pub struct LevenbergMarquardt {
     /// The iterations in a row that have changed the sum of squares by less than `10⁻⁷` of it; 0 to begin with. Eight of them are
     /// a minimum: the runs differ by more, where their steps go another way.
     pub stalled: u32,
+    /// The least and the largest value of each unknown; none if the list is shorter. A [fit](crate::Fit) replaces them by
+    /// [its own](crate::FitBuilder::between).
+    pub bounds: Vec<[f64; 2]>,
+    /// The loss of the residuals in place of their squares, if there is one.
+    pub robust: Option<Robust>,
 }
 
 impl Default for LevenbergMarquardt {
@@ -79,6 +91,8 @@ impl Default for LevenbergMarquardt {
             negligible: 1e-2,
             limits: Vec::new(),
             stalled: 0,
+            bounds: Vec::new(),
+            robust: None,
         }
     }
 }
@@ -99,12 +113,31 @@ impl LevenbergMarquardt {
         self.stalled >= SLOW.1
     }
 
-    /// The residuals and the columns of the unknowns that they depend on.
-    pub(crate) fn relevant(&self, whole: &Squares) -> Squares {
-        let mut at = whole.clone();
-        let least = self.negligible * (whole.sum() / whole.residuals.len() as f64).sqrt();
+    /// The sum that is minimised: `|r|²`, or that of the loss.
+    pub(crate) fn sum(&self, whole: &Squares) -> f64 {
+        self.robust.map_or_else(|| whole.sum(), |loss| loss.sum(whole.residuals.as_slice()))
+    }
+
+    /// The bound that holds each unknown.
+    pub(crate) fn held(&self, whole: &Squares, here: &[f64]) -> Vec<Option<Bound>> {
+        match self.robust {
+            _ if self.bounds.is_empty() => Vec::new(),
+            Some(loss) => held(&loss.scaled(whole), here, &self.bounds),
+            None => held(whole, here, &self.bounds),
+        }
+    }
+
+    /// The residuals and the columns of the unknowns that they depend on and that no bound holds.
+    pub(crate) fn relevant(&self, whole: &Squares, here: &[f64]) -> Squares {
+        let mut at = self.robust.map_or_else(|| whole.clone(), |loss| loss.scaled(whole));
+        let least = self.negligible * (self.sum(whole) / whole.residuals.len() as f64).sqrt();
         for (mut column, limit) in at.jacobian.column_iter_mut().zip(&self.limits) {
             if column.norm() * limit < least {
+                column.fill(0.0);
+            }
+        }
+        for (mut column, held) in at.jacobian.column_iter_mut().zip(self.held(whole, here)) {
+            if held.is_some() {
                 column.fill(0.0);
             }
         }
@@ -119,23 +152,63 @@ impl LevenbergMarquardt {
         }
     }
 
-    /// The step within the radius, its length, and the reduction of the sum of squares that it predicts.
-    fn step(&mut self, at: &Squares) -> Option<(DVector<f64>, f64, f64)> {
+    /// The step within the radius and the bounds.
+    fn step(&mut self, at: &Squares, here: &[f64]) -> Option<Step> {
         let lengths: Vec<f64> =
             self.lengths.iter().map(|&l| if l > 0.0 { l } else { 1.0 }).collect();
-        let linear = Linear::of(at, &lengths)?;
-        if self.radius.is_nan() {
-            self.radius = linear.damped(self.damping).norm();
-        }
-        let hat = linear.within(self.radius);
-        let whole = DVector::from_fn(hat.len(), |k, _| hat[k] / lengths[k]);
+        let whole = if self.bounds.is_empty() {
+            let linear = Linear::of(at, &lengths)?;
+            if self.radius.is_nan() {
+                self.radius = linear.damped(self.damping).norm();
+            }
+            let hat = linear.within(self.radius);
+            DVector::from_fn(hat.len(), |k, _| hat[k] / lengths[k])
+        } else {
+            // The columns of those that a bound holds are zero, and so are columns of no effect.
+            let is_held: Vec<bool> =
+                at.jacobian.column_iter().map(|column| column.norm() == 0.0).collect();
+            let room: Vec<[f64; 2]> = (here.iter().enumerate())
+                .map(|(j, phi)| self.bounds_of(j).map(|bound| bound - phi))
+                .collect();
+            let model = InBox { at, lengths: &lengths, room: &room };
+            if self.radius.is_nan() {
+                self.radius = model.damped(self.damping, &is_held)?;
+            }
+            model.within(self.radius, &is_held)?
+        };
         let cut = whole.iter().zip(&self.limits).fold(1.0, |cut: f64, (step, limit)| {
             if step.abs() > *limit { cut.min(limit / step.abs()) } else { cut }
         });
         let delta = whole * cut;
         let linear = &at.jacobian * &delta + &at.residuals;
-        Some((delta, hat.norm() * cut, at.sum() - linear.norm_squared()))
+        let hat = DVector::from_fn(delta.len(), |k, _| delta[k] * lengths[k]);
+        let there = (here.iter().enumerate())
+            .map(|(j, phi)| {
+                let ([lower, upper], delta) = (self.bounds_of(j), delta[j]);
+                if delta <= lower - phi {
+                    lower
+                } else if delta >= upper - phi {
+                    upper
+                } else {
+                    (phi + delta).clamp(lower, upper)
+                }
+            })
+            .collect();
+        Some(Step { there, length: hat.norm(), predicted: at.sum() - linear.norm_squared() })
     }
+
+    fn bounds_of(&self, j: usize) -> [f64; 2] {
+        self.bounds.get(j).copied().unwrap_or(WITHOUT)
+    }
+}
+
+/// A trial of an iteration.
+struct Step {
+    there: Vec<f64>,
+    /// Its length in units of the columns.
+    length: f64,
+    /// The reduction of the sum that it predicts.
+    predicted: f64,
 }
 
 impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
@@ -149,9 +222,13 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
         mut state: Iteration,
     ) -> Result<(Iteration, Option<KV>), Error> {
         let start = state.take_param().ok_or_else(|| Error::msg("the solver has no start"))?;
+        let is_inside = |(phi, [lower, upper]): (&f64, &[f64; 2])| lower <= phi && phi <= upper;
+        if !start.iter().zip(&self.bounds).all(is_inside) {
+            return Err(Error::msg("the start is outside of its bounds"));
+        }
         let at = evaluate(problem, &start)?
             .ok_or_else(|| Error::msg("the start is outside of the domain of the problem"))?;
-        let cost = at.sum();
+        let cost = self.sum(&at);
         Ok((state.param(start).cost(cost).residuals(at.residuals).jacobian(at.jacobian), None))
     }
 
@@ -167,7 +244,7 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             state.take_jacobian().ok_or_else(missing)?,
         );
         let whole = Squares { residuals, jacobian };
-        let (at, sum) = (self.relevant(&whole), whole.sum());
+        let (at, sum) = (self.relevant(&whole, &here), self.sum(&whole));
         let keep = |state: Iteration, whole: Squares, here: Vec<f64>| {
             state.param(here).cost(sum).residuals(whole.residuals).jacobian(whole.jacobian)
         };
@@ -176,26 +253,25 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
         self.measure(&at.jacobian);
-        let Some((delta, length, predicted)) = self.step(&at) else {
+        let Some(Step { there, length, predicted }) = self.step(&at, &here) else {
             return Err(Error::msg("the Jacobian has no singular values"));
         };
         let is_rounding = here
             .iter()
-            .zip(delta.iter())
-            .all(|(phi, delta)| delta.abs() <= 4.0 * f64::EPSILON * phi.abs());
+            .zip(&there)
+            .all(|(phi, there)| (there - phi).abs() <= 4.0 * f64::EPSILON * phi.abs());
         if predicted <= 0.1 * self.reduction * sum || is_rounding {
             return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
-        let there: Vec<f64> =
-            here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
         let kv = argmin::kv!("radius" => self.radius;);
-        let is_near = |next: &Squares| (next.sum() - sum).abs() <= SLOW.0 * sum;
-        self.stalled = if next.as_ref().is_some_and(is_near) { self.stalled + 1 } else { 0 };
+        let after = next.as_ref().map_or(f64::INFINITY, |next| self.sum(next));
+        let is_near = (after - sum).abs() <= SLOW.0 * sum;
+        self.stalled = if is_near { self.stalled + 1 } else { 0 };
         let has_stalled = self.has_stalled();
-        match next.filter(|next| next.sum() < sum) {
+        match next.filter(|_| after < sum) {
             Some(next) => {
-                let (after, reduction) = (next.sum(), sum - next.sum());
+                let reduction = sum - after;
                 let ratio = reduction / predicted;
                 if ratio < POOR.0 {
                     self.radius = POOR.1 * length;

@@ -12,7 +12,10 @@
 //! |---|---|
 //! | [`error`](mod@error) | [`FitError`]: why there is no fit |
 //! | [`least_squares`] | [`LeastSquares`]: residuals and their Jacobian, from one run |
+//! | [`bounds`] | [`Which`] parameter is kept in an interval, and the [`Bound`] that holds it |
+//! | [`robust`] | [`Robust`]: losses that outliers move little |
 //! | `trust_region` | the best step of a linear model within a trust region |
+//! | `projected` | this step within a box |
 //! | [`levenberg_marquardt`] | [`LevenbergMarquardt`]: a solver for argmin's executor |
 //! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
@@ -22,6 +25,7 @@
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
 //! | [`loss`](mod@loss) | [`Loss`]: a loss over runs with its gradient, for argmin's L-BFGS |
 
+pub mod bounds;
 pub mod covariance;
 pub mod error;
 pub mod fit;
@@ -30,10 +34,13 @@ pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod loss;
 mod model;
+mod projected;
+pub mod robust;
 mod systems;
 mod trust_region;
 pub mod unknowns;
 
+pub use bounds::{Bound, Which};
 pub use error::FitError;
 pub use fit::{FamilyStart, Fit, FitBuilder, Observation, SystemStart};
 pub use fitted::{Ending, Estimate, Fitted};
@@ -41,3 +48,4 @@ pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use loss::{Graded, Loss, LossOver, Minimised};
 pub use model::Failure;
+pub use robust::Robust;

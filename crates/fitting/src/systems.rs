@@ -7,7 +7,8 @@
 //! ```
 //!
 //! of two runs in the steps of a third one at `φ` ([`StepSequence`]; Bock 1981). `s` is the size of the parameter, or 1 for a logarithm.
-//! Round-off and truncation are both about `ε^{2/3}` of it.
+//! Round-off and truncation are both about `ε^{2/3}` of it. No run is taken outside of the bounds of a parameter: beside one the
+//! derivative is that of the parabola through `φ` and two points inside.
 
 use metriplectic_integrators::step::Element;
 use metriplectic_integrators::{
@@ -56,6 +57,38 @@ pub(crate) fn slope(
         (Ok(after), Ok(before)) => Ok((after - before) / (above - below)),
         (Ok(after), Err(_)) => Ok((after - here) / (above - at)),
         (Err(_), Ok(before)) => Ok((here - before) / (at - below)),
+        (Err(failure), Err(_)) => Err(failure),
+    }
+}
+
+/// The points for a difference within bounds: the sides, or two at equal distances on the side with more room.
+fn sides_within(at: f64, size: f64, [lower, upper]: [f64; 2]) -> [f64; 2] {
+    let sides = sides(at, size);
+    if sides.iter().all(|side| lower <= *side && *side <= upper) {
+        return sides;
+    }
+    let step = sides[0] - at;
+    let (end, step) = if upper - at >= at - lower { (upper, step) } else { (lower, -step) };
+    if step.abs() * 2.0 <= (end - at).abs() {
+        [at + step, at + 2.0 * step]
+    } else {
+        [0.5 * (at + end), end]
+    }
+}
+
+/// The slope at `at` of the parabola through its numbers and those at two points on one side of it. Where one of them has no run, the
+/// slope to the other one.
+fn slope_on_one_side(
+    (at, here): (f64, &DVector<f64>),
+    [(near, first), (far, second)]: [(f64, Result<DVector<f64>, Failure>); 2],
+) -> Result<DVector<f64>, Failure> {
+    let (a, b) = (near - at, far - at);
+    match (first, second) {
+        (Ok(first), Ok(second)) => {
+            Ok(((first - here) * (b * b) - (second - here) * (a * a)) / (a * b * (b - a)))
+        }
+        (Ok(first), Err(_)) => Ok((first - here) / a),
+        (Err(_), Ok(second)) => Ok((second - here) / b),
         (Err(failure), Err(_)) => Err(failure),
     }
 }
@@ -115,11 +148,14 @@ where
         for (j, unknown) in self.unknowns.iter().enumerate() {
             let guess = self.guess[unknown.index];
             let size = if unknown.positive { 1.0 } else { phi[j].abs().max(guess.abs()) };
-            let beside = sides(phi[j], size).map(|side| {
+            let points = sides_within(phi[j], size, unknown.range());
+            let beside = points.map(|side| {
                 let mut phi = phi.to_vec();
                 phi[j] = side;
                 (side, runs.next(|schedule| self.residuals(&phi, schedule)))
             });
+            let is_between = (points[0] - phi[j]) * (points[1] - phi[j]) < 0.0;
+            let slope = if is_between { slope } else { slope_on_one_side };
             jacobian.set_column(j, &slope((phi[j], &residuals), beside)?);
         }
         Ok(Squares { residuals, jacobian })

@@ -2,6 +2,7 @@
 
 use nalgebra::SVector;
 
+use crate::bounds::Bounds;
 use crate::error::FitError;
 
 /// A free parameter.
@@ -13,6 +14,8 @@ pub struct Unknown {
     pub name: &'static str,
     /// Whether its logarithm is fitted, so that it stays positive.
     pub positive: bool,
+    /// The least and the largest value of the parameter; infinite without a bound.
+    pub bounds: [f64; 2],
 }
 
 impl Unknown {
@@ -21,9 +24,27 @@ impl Unknown {
         if self.positive { theta.ln() } else { theta }
     }
 
-    /// The parameter of an unknown.
+    /// The least and the largest unknown; those of a logarithm without a positive bound are infinite.
+    pub fn range(&self) -> [f64; 2] {
+        let [lower, upper] = self.bounds;
+        [self.of(if self.positive { lower.max(0.0) } else { lower }), self.of(upper)]
+    }
+
+    /// The parameter of an unknown; at a bound it has the bits of the bound.
     pub fn parameter(&self, phi: f64) -> f64 {
-        if self.positive { phi.exp() } else { phi }
+        if !self.positive {
+            return phi;
+        }
+        let ([lower, upper], [first, last]) = (self.bounds, self.range());
+        if phi == f64::NEG_INFINITY || phi == f64::INFINITY {
+            phi.exp()
+        } else if phi <= first {
+            lower
+        } else if phi >= last {
+            upper
+        } else {
+            phi.exp().clamp(lower, upper)
+        }
     }
 
     /// The derivative `dθ/dφ`.
@@ -82,9 +103,11 @@ pub(crate) fn unknowns(
     known: &[&'static str],
     guess: &[f64],
     [free, positive]: [&Names; 2],
+    bounds: &Bounds,
 ) -> Result<Vec<Unknown>, FitError> {
     free.check(known)?;
     positive.check(known)?;
+    let bounds = bounds.around(known, guess)?;
     let mut unknowns = Vec::new();
     for (index, &name) in known.iter().enumerate().filter(|(_, name)| free.has(name)) {
         let positive = positive.has(name);
@@ -92,7 +115,7 @@ pub(crate) fn unknowns(
         if positive && !(value > 0.0 && value.is_finite()) {
             return Err(FitError::NotPositive { name, value });
         }
-        unknowns.push(Unknown { index, name, positive });
+        unknowns.push(Unknown { index, name, positive, bounds: bounds[index] });
     }
     if unknowns.is_empty() { Err(FitError::NothingFree) } else { Ok(unknowns) }
 }

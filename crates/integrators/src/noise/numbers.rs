@@ -33,6 +33,20 @@ pub trait Numbers: Clone + Debug + Sync {
     /// Whether the noise fields of a step are followed in the opposite order: a fair coin.
     fn is_backward(&self, step: u64) -> bool;
 
+    /// The number `ζ` of a place between the ends of a step, with the moments of [`number`](Self::number), for the Brownian path
+    /// [inside it](super::levy()); `None` without such numbers: then no state between the ends is known.
+    fn between(&self, step: u64, term: usize, place: u64) -> Option<f64> {
+        let _ = (step, term, place);
+        None
+    }
+
+    /// A number that is uniform in `(0, 1)`, for the [excursions](crate::Stepper::excursion) in a part of a step; `None` where numbers
+    /// are not Gaussian, or there are no such numbers.
+    fn uniform(&self, step: u64, part: u64) -> Option<f64> {
+        let _ = (step, part);
+        None
+    }
+
     /// The name in a checkpoint; a run is resumed with numbers of its name.
     fn name(&self) -> String;
 }
@@ -48,6 +62,10 @@ pub enum Purpose {
     Coin = 1,
     /// The directions in which a model is tried.
     Trial = 2,
+    /// The number of a term at a place between the ends of a step.
+    Between = 3,
+    /// Whether a path has left a region and come back.
+    Excursion = 4,
 }
 
 /// The numbers of `(seed, path, step, term)` by Philox4x64-10.
@@ -92,7 +110,21 @@ impl Counter {
 
     /// The block of a step and a term.
     const fn block(&self, step: u64, term: u64, purpose: Purpose) -> [u64; 4] {
-        philox([self.seed, self.path], [step, term, purpose as u64, 0])
+        self.block_at(step, term, purpose, 0)
+    }
+
+    /// The block of a place of a step and a term.
+    const fn block_at(&self, step: u64, term: u64, purpose: Purpose, place: u64) -> [u64; 4] {
+        philox([self.seed, self.path], [step, term, purpose as u64, place])
+    }
+
+    /// The number of a block.
+    fn of_block(&self, [first, second, ..]: [u64; 4]) -> f64 {
+        if self.is_three_point {
+            return three_point(first);
+        }
+        let [radius, angle] = [uniform(first), uniform(second)];
+        (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
     }
 }
 
@@ -112,16 +144,20 @@ fn three_point(u: u64) -> f64 {
 
 impl Numbers for Counter {
     fn number(&self, step: u64, term: usize) -> f64 {
-        let [first, second, ..] = self.block(step, term as u64, Purpose::Term);
-        if self.is_three_point {
-            return three_point(first);
-        }
-        let [radius, angle] = [uniform(first), uniform(second)];
-        (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
+        self.of_block(self.block(step, term as u64, Purpose::Term))
     }
 
     fn is_backward(&self, step: u64) -> bool {
         self.block(step, 0, Purpose::Coin)[0] >> 63 == 1
+    }
+
+    fn between(&self, step: u64, term: usize, place: u64) -> Option<f64> {
+        Some(self.of_block(self.block_at(step, term as u64, Purpose::Between, place)))
+    }
+
+    fn uniform(&self, step: u64, part: u64) -> Option<f64> {
+        let number = || uniform(self.block(step, part, Purpose::Excursion)[0]);
+        (!self.is_three_point).then(number)
     }
 
     fn name(&self) -> String {
@@ -176,6 +212,14 @@ mod tests {
         assert_eq!(Counter::new(1).number(5, 2).to_bits(), base.to_bits());
     }
 
+    const PURPOSES: [Purpose; 5] = [
+        Purpose::Term,
+        Purpose::Coin,
+        Purpose::Trial,
+        Purpose::Between,
+        Purpose::Excursion,
+    ];
+
     #[test]
     fn no_counter_comes_twice() {
         // At the powers of two, where a word that is too narrow wraps, and beside them.
@@ -185,7 +229,7 @@ mod tests {
         };
         let counter = Counter::new(1);
         let mut blocks: Vec<[u64; 4]> = Vec::new();
-        for purpose in [Purpose::Term, Purpose::Coin, Purpose::Trial] {
+        for purpose in PURPOSES {
             for step in edges() {
                 blocks.extend(edges().map(|term| counter.block(step, term, purpose)));
             }
@@ -193,7 +237,7 @@ mod tests {
         blocks.sort_unstable();
         let count = blocks.len();
         blocks.dedup();
-        assert!(count == 3 * 49 * 49 && blocks.len() == count, "{} of {count}", blocks.len());
+        assert!(count == PURPOSES.len() * 49 * 49 && blocks.len() == count, "{} of {count}", blocks.len());
         let coins = (0..64).filter(|step| counter.is_backward(*step)).count();
         let leading =
             (0..64).filter(|step| counter.block(*step, 0, Purpose::Term)[0] >> 63 == 1).count();

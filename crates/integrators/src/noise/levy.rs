@@ -74,6 +74,25 @@ mod tests {
     }
 
     #[test]
+    fn a_coarse_step_has_the_path_of_two_fine_ones() {
+        for fine in
+            [Counter::new(5).path(2), Counter::new(5).coarsened(1), Counter::new(5).three_point()]
+        {
+            let coarse = fine.coarsened(1);
+            let at = |counter: Counter, step: u64, theta: f64| {
+                levy(&counter, (step, 3), theta).unwrap() * theta.sqrt()
+            };
+            for theta in [0.11, 0.25, 0.7, 0.5] {
+                let first = at(fine, 14, theta) * 0.5_f64.sqrt();
+                assert!((at(coarse, 7, 0.5 * theta) - first).abs() < 1e-14);
+                let second = (fine.number(14, 3) + at(fine, 15, theta)) * 0.5_f64.sqrt();
+                assert!((at(coarse, 7, 0.5 + 0.5 * theta) - second).abs() < 1e-14);
+            }
+            assert_ne!(coarse.name(), fine.name());
+        }
+    }
+
+    #[test]
     fn the_end_is_the_number_of_the_step() {
         let counter = Counter::new(5);
         let at = |theta: f64| levy(&counter, (7, 2), theta).unwrap() * theta.sqrt();

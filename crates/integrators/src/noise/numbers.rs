@@ -20,7 +20,7 @@
 //! or `−√3, √3, 0` where `⌊6 u₀/2⁶⁴⌋` is 0, 1, or larger. The coin of a step is the leading bit of `u₀`. Integers are the
 //! same on each machine and on each device, and Gaussian numbers to the round-off of its logarithm and cosine.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::fmt::Debug;
 
 use super::philox::philox;
@@ -84,6 +84,8 @@ pub struct Counter {
     seed: u64,
     path: u64,
     is_three_point: bool,
+    /// A step is that of `2^doublings` steps of the path.
+    doublings: u32,
 }
 
 /// `2⁻⁵²`.
@@ -92,7 +94,7 @@ const UNIT: f64 = 1.0 / (1_u64 << 52) as f64;
 impl Counter {
     /// The Gaussian numbers of a seed, on path 0.
     pub const fn new(seed: u64) -> Self {
-        Self { seed, path: 0, is_three_point: false }
+        Self { seed, path: 0, is_three_point: false, doublings: 0 }
     }
 
     /// Takes another path of the same seed.
@@ -106,6 +108,21 @@ impl Counter {
     #[must_use]
     pub const fn three_point(self) -> Self {
         Self { is_three_point: true, ..self }
+    }
+
+    /// Takes the Brownian path of steps of size `h` in steps of size `2^doublings h`: the number of two steps in one is
+    /// `(ξ₁ + ξ₂)/√2`. Two runs on one path differ by the error of their steps, and hardly by chance.
+    #[must_use]
+    pub const fn coarsened(self, doublings: u32) -> Self {
+        Self { doublings: self.doublings + doublings, ..self }
+    }
+
+    /// The numbers of steps of half the size.
+    const fn halved(&self) -> Option<Self> {
+        match self.doublings.checked_sub(1) {
+            Some(doublings) => Some(Self { doublings, ..*self }),
+            None => None,
+        }
     }
 
     /// The block of a step and a term.
@@ -144,15 +161,28 @@ fn three_point(u: u64) -> f64 {
 
 impl Numbers for Counter {
     fn number(&self, step: u64, term: usize) -> f64 {
+        if let Some(halved) = self.halved() {
+            let [first, second] = [0, 1].map(|half| halved.number(2 * step + half, term));
+            return (first + second) * FRAC_1_SQRT_2;
+        }
         self.of_block(self.block(step, term as u64, Purpose::Term))
     }
 
     fn is_backward(&self, step: u64) -> bool {
-        self.block(step, 0, Purpose::Coin)[0] >> 63 == 1
+        self.block(step << self.doublings, 0, Purpose::Coin)[0] >> 63 == 1
     }
 
     fn between(&self, step: u64, term: usize, place: u64) -> Option<f64> {
-        Some(self.of_block(self.block_at(step, term as u64, Purpose::Between, place)))
+        let Some(halved) = self.halved() else {
+            return Some(self.of_block(self.block_at(step, term as u64, Purpose::Between, place)));
+        };
+        // The digits of a place after its first one say the way to it: 0 for an earlier half.
+        let Some(last) = place.checked_ilog2()?.checked_sub(1) else {
+            let [first, second] = [0, 1].map(|half| halved.number(2 * step + half, term));
+            return Some((first - second) * FRAC_1_SQRT_2);
+        };
+        let half = (place >> last) & 1;
+        halved.between(2 * step + half, term, (place & ((1 << last) - 1)) | (1 << last))
     }
 
     fn uniform(&self, step: u64, part: u64) -> Option<f64> {
@@ -162,7 +192,11 @@ impl Numbers for Counter {
 
     fn name(&self) -> String {
         let law = if self.is_three_point { "three-point" } else { "Gaussian" };
-        format!("seed {}, path {}, {law}", self.seed, self.path)
+        let steps = match self.doublings {
+            0 => String::new(),
+            doublings => format!(", 2^{doublings} steps in one"),
+        };
+        format!("seed {}, path {}, {law}{steps}", self.seed, self.path)
     }
 }
 
@@ -212,13 +246,8 @@ mod tests {
         assert_eq!(Counter::new(1).number(5, 2).to_bits(), base.to_bits());
     }
 
-    const PURPOSES: [Purpose; 5] = [
-        Purpose::Term,
-        Purpose::Coin,
-        Purpose::Trial,
-        Purpose::Between,
-        Purpose::Excursion,
-    ];
+    const PURPOSES: [Purpose; 5] =
+        [Purpose::Term, Purpose::Coin, Purpose::Trial, Purpose::Between, Purpose::Excursion];
 
     #[test]
     fn no_counter_comes_twice() {
@@ -237,7 +266,11 @@ mod tests {
         blocks.sort_unstable();
         let count = blocks.len();
         blocks.dedup();
-        assert!(count == PURPOSES.len() * 49 * 49 && blocks.len() == count, "{} of {count}", blocks.len());
+        assert!(
+            count == PURPOSES.len() * 49 * 49 && blocks.len() == count,
+            "{} of {count}",
+            blocks.len()
+        );
         let coins = (0..64).filter(|step| counter.is_backward(*step)).count();
         let leading =
             (0..64).filter(|step| counter.block(*step, 0, Purpose::Term)[0] >> 63 == 1).count();

@@ -8,8 +8,8 @@ use super::system::Noisy;
 use crate::explicit::along;
 use crate::step::evidence::RESOLVED;
 use crate::step::{
-    Effort, Element, Excursion, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError, Saved,
-    StepEnds, StepError, StepStart, Stepper, Taken,
+    Effort, Element, Excursion, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError,
+    Saved, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// A way to sample a system with noise: [`RandomFlow`](super::RandomFlow) and
@@ -65,6 +65,12 @@ impl<S> Sampler<S> {
     #[must_use]
     pub fn path(self, path: u64) -> Self {
         Self { numbers: self.numbers.path(path), ..self }
+    }
+
+    /// Takes steps of size `2^doublings h` on the Brownian path of steps of size `h`, see [`Counter::coarsened`].
+    #[must_use]
+    pub fn coarsened(self, doublings: u32) -> Self {
+        Self { numbers: self.numbers.coarsened(doublings), ..self }
     }
 
     /// Takes numbers of [three points](Counter::three_point).

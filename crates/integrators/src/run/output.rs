@@ -15,7 +15,9 @@ use crate::run::stepping::{AnyStepper, Stepping};
 use crate::run::steps::Steps;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::dense::{Target, between, says_between};
-use crate::step::{Element, Excursion, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper};
+use crate::step::{
+    Element, Excursion, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper,
+};
 
 impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other

@@ -339,9 +339,8 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         sizes: [f64; 2],
         memory: &PlainMemory,
     ) -> Option<Entries> {
-        let inside = || {
-            self.from(start, |start| self.method.on_path(start, sizes, memory.after_a_step()?))
-        };
+        let inside =
+            || self.from(start, |start| self.method.on_path(start, sizes, memory.after_a_step()?));
         let inside =
             if const { F::CATCHES_PANICS } { caught(inside).ok().flatten() } else { inside() };
         inside.map(|x| F::write(&x))

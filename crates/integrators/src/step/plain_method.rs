@@ -5,8 +5,8 @@ use std::fmt::Debug;
 
 use super::plain::{Directions, Entries};
 use super::{
-    Control, Element, Excursion, LimitingSites, Memory, MethodError, NoiseSummary, PlainFlow, Promises,
-    Refusal, RestoreError, Saved, StepEnds, StepError, StepStart, Stepper, Taken,
+    Control, Element, Excursion, LimitingSites, Memory, MethodError, NoiseSummary, PlainFlow,
+    Promises, Refusal, RestoreError, Saved, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// A method for flows in plain numbers, of which nothing else is known: a [`Stepper`] behind a pointer.

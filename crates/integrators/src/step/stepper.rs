@@ -1,8 +1,9 @@
 //! The interface between runs and methods.
 
 use super::{
-    Compiled, Control, Effort, Element, Excursion, Flow, LimitingSites, Memory, MethodError, NoiseSummary,
-    Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
+    Compiled, Control, Effort, Element, Excursion, Flow, LimitingSites, Memory, MethodError,
+    NoiseSummary, Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense,
+    name_of,
 };
 
 /// A one-step method.

@@ -115,8 +115,7 @@ impl<M: StateSpace> Watched<M> {
         path: &mut dyn Path<M>,
     ) -> Option<()> {
         let [a, b] = [before.value, next.value];
-        let change =
-            |rises: bool| Change { theta: next.theta, rises, state: next.state.clone() };
+        let change = |rises: bool| Change { theta: next.theta, rises, state: next.state.clone() };
         if self.changes(a, b) {
             changes.push(change(a < 0.0));
         } else if self.request.bridged && a * b > 0.0 && before.theta < next.theta {

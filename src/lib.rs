@@ -92,7 +92,8 @@ pub mod prelude {
     };
     #[cfg(feature = "ensembles")]
     pub use metriplectic_ensembles::{
-        Estimate, FluctuationTheorem, Row, RowStatus, Shard, Sweep, Table, geomspace, linspace,
+        Doubling, Estimate, FluctuationTheorem, Row, RowStatus, Shard, Sweep, Table, geomspace,
+        linspace,
     };
     pub use metriplectic_fields::{ErasedField, MatrixField, Piecewise, Real, Scalar, ScalarField};
     #[cfg(feature = "fitting")]

@@ -53,6 +53,7 @@
 //! 6. [Samples that are added](Sweep::more_samples) change no row that was there.
 
 mod bar;
+mod doubling;
 mod draw;
 mod entry;
 mod error;
@@ -76,6 +77,7 @@ mod shard;
 mod sweep_error;
 mod table;
 
+pub use doubling::{DoubledPath, Doubling, DoublingError, StepAdviceError, StepBias};
 pub use draw::Draw;
 pub use entry::RowStatus;
 pub use error::{JournalError, PlanError, TableError};

@@ -91,7 +91,7 @@ pub use run::{
 };
 pub use step::{
     Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
-    EventExchange, Evidence, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,
+    EventExchange, Evidence, Excursion, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,
     LedgerSummary, LimitingSites, Listed, Memory, MethodError, NoiseSummary, Panicked, PathOfStep,
     PlainNumbers, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError,
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,

@@ -38,6 +38,10 @@
 //! A number is a function of the seed, the path, the step and the term alone ([`Counter`]), by [`philox`]. So a run that is
 //! resumed has the same numbers, and so have runs on other threads.
 //!
+//! Between the ends of a step the Brownian path of each term is that of [Lévy's construction](levy()). The state at a fraction `θ` of a
+//! step is the end of a step of size `θh` with the numbers `W_r(θ)/√θ`: an output there is on the same path, and the steps stay as
+//! they are. Such states and those at the ends of steps have one law together, of the weak order of the method.
+//!
 //! # Limits
 //!
 //! The error of the law is `O((h|K'|)²)` at best. Each step measures `h|K'|` along the way of its noise fields, by which
@@ -52,6 +56,7 @@ mod error;
 mod flow;
 mod fluctuating;
 mod judged;
+mod levy;
 mod moves;
 mod ninomiya_victoir;
 mod numbers;
@@ -67,6 +72,7 @@ pub(crate) use equations::{OwnTerms, Term, kinetic_drift, start_and_near, summed
 pub use error::{NoiseError, NoisyError};
 pub use fluctuating::{Drawn, Fluctuating, Landing, Noise};
 pub use judged::Judged;
+pub use levy::levy;
 pub use ninomiya_victoir::NinomiyaVictoir;
 pub use numbers::{Counter, Numbers, Purpose};
 pub use philox::philox;

@@ -61,7 +61,7 @@ pub use panicked::Panicked;
 pub(crate) use plain::Few;
 pub use plain::{Directions, Entries, Values};
 pub(crate) use plain_method::PlainMethod;
-pub use result::{Refusal, StepEnds, StepStart, Taken};
+pub use result::{Excursion, Refusal, StepEnds, StepStart, Taken};
 pub use scales::Scales;
 pub use start::Numbers;
 pub(crate) use start::{CountOf, Dim, DriftCorrection, Start};

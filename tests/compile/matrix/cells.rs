@@ -23,7 +23,7 @@ energy and entropy in boxes: `erased` | erased     | members   | boxes        | 
 `tangent` of `WeylMidpoint`           | schemes    | default   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 `tangent` of `DormandPrince8`         | explicit   | explicit  | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 `tangent` of `Gauss`                  | stages     | stages    | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
-`tangent` across a jump               | saltation  | saltation | bounces      | no events | no events  | bounces  | bounces      | no events     | bounces      | bounces
+`tangent` across a jump               | saltation  | saltation | bounces      | no passages | no passages | bounces | bounces     | no passages   | bounces      | bounces
 `adjoint` of `DormandPrince8`         | transposed | adjoint   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 derivatives along parameters          | a family   | a family  | its ledger   | along its noise | along its noise | along sites | along sites | along sites | a ball  | a ball
 `Fit`                                 | fit        | fit       | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
@@ -37,9 +37,9 @@ thermal noise in its builder          | promises   | rubbed    | books        | 
 an energy that depends on time        | promises   | pushed    | –            | books     | books      | masses   | masses       | field         | masses       | masses
 ports and baths                       | promises   | pushed    | –            | books     | –          | promises | –            | warm sites    | masses       | masses
 
-events                                | events     | saltation | ledger       | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
-jumps                                 | promises   | saltation | kicks        | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
-outputs                               | outputs    | inside    | ledger       | ends      | ends       | helix    | quench       | ends          | numbers runs | numbers runs
+events                                | events     | saltation | ledger       | passages  | passages   | helix    | quench       | sites pass    | numbers runs | numbers runs
+jumps                                 | promises   | saltation | kicks        | resets    | resets     | helix    | quench       | sites pass    | numbers runs | numbers runs
+outputs                               | outputs    | inside    | ledger       | on its path | on its path | helix  | quench      | on their path | numbers runs | numbers runs
 checkpoints                           | resumed    | default   | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
 `Sweep`                               | sweeps     | member    | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
 `Observables`                         | tables     | member    | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
@@ -326,17 +326,36 @@ pub(crate) const TESTS: &[Reference] = &[
     right("kicks", "tests/jumps.rs", "an_open_system_has_the_jumps_in_its_ledger"),
     right("helix", "tests/lattices.rs", "runs_have_outputs_events_rest_and_checkpoints"),
     right("quench", "tests/open_lattices.rs", "outputs_jumps_and_checkpoints_of_an_open_lattice"),
+    partly(
+        "passages",
+        ["tests/passages.rs", "first_passages_have_the_orders_one_half_and_one"],
+        "seen at the ends of steps, and by the Brownian bridge between them: \
+         [of the order 1/2 or 1 in the step](noise.md#events-and-outputs)",
+    ),
+    partly(
+        "resets",
+        ["tests/passages.rs", "a_particle_is_reset_at_each_passage"],
+        "seen at the ends of steps, and by the Brownian bridge between them: \
+         [of the order 1/2 or 1 in the step](noise.md#events-and-outputs)",
+    ),
+    partly(
+        "sites pass",
+        ["tests/passages.rs", "a_noisy_lattice_has_events_and_outputs_between_steps"],
+        "seen at the ends of steps, and by the Brownian bridge between them: \
+         [of the order 1/2 or 1 in the step](noise.md#events-and-outputs)",
+    ),
     refused(
-        "no events",
-        ["tests/noise/refusals.rs", "events_and_jumps"],
-        "refused where the number changes its sign: `NoiseError::HasNoBetween`",
+        "no passages",
+        ["tests/passages.rs", "tangents_of_paths_have_no_events"],
+        "refused: `TangentError::Broken`, since the end of a step is the time of an event",
     ),
     right("outputs", "tests/dense_output.rs", "outputs_are_as_accurate_as_the_steps"),
     right("inside", "tests/tangent/explicit.rs", "outputs_inside_steps_have_tangents"),
-    partly(
-        "ends",
-        ["tests/noise/refusals.rs", "constants_steps_and_outputs"],
-        "at the ends of steps; between them `NoiseError::HasNoBetween`",
+    right("on its path", "tests/passages.rs", "outputs_between_steps_are_on_the_path"),
+    right(
+        "on their path",
+        "tests/passages.rs",
+        "a_noisy_lattice_has_events_and_outputs_between_steps",
     ),
     right("resumed", "tests/checkpoint.rs", "a_resumed_run_is_the_run"),
     right("put down", "tests/noise/paths.rs", "a_path_that_is_put_down_goes_on_with_the_same_bits"),

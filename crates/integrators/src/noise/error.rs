@@ -155,10 +155,11 @@ pub enum NoiseError {
          the law; take `Span::steps`"
     )]
     NeedsFixedSteps,
-    /// An output or an event is inside a step.
+    /// A state inside a step, or an excursion, is asked for of numbers that do not have it, or in a step that a corner cuts.
     #[error(
-        "a step of noise has no state inside it, where an output or an event was asked for: what lies between is a path of \
-         its own; ask at the ends of steps"
+        "this step of noise has no state inside it, where an output or an event was asked for: numbers of your own need \
+         `Numbers::between` and `Numbers::uniform`, three-point numbers know no excursions (`Watched::bridged`), and a step that a corner \
+         cuts has its ends alone; ask at the ends of steps"
     )]
     HasNoBetween,
     /// The method that is wrapped has an order below 2.

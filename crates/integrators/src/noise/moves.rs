@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::error::NoiseError;
 use super::fluctuating::{Fluctuating, Landing};
+use super::levy::levy;
 use super::numbers::Numbers;
 use super::system::Noisy;
 use crate::explicit::along;
@@ -21,6 +22,8 @@ pub struct Moves<'a, F: Fluctuating<U>, U, R> {
     system: &'a Noisy<F, U>,
     numbers: &'a R,
     step: u64,
+    /// The fraction of the step at which it ends, if it is a part of a whole one.
+    part: Option<f64>,
     time: f64,
     h: f64,
     reference: &'a Laws<F::Numbers>,
@@ -39,12 +42,26 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
             system: start.flow,
             numbers,
             step,
+            part: None,
             time: start.time,
             h,
             reference: &start.reference,
             x: start.x.clone(),
             evidence: Evidence { rests: false, ..Evidence::default() },
             effort: Effort::default(),
+        }
+    }
+
+    /// The first part of a step of size `h`, up to the fraction `θ`, on the same path.
+    pub(super) fn part(self, theta: f64) -> Self {
+        Self { h: theta * self.h, part: Some(theta), ..self }
+    }
+
+    /// The number of a term; not a number where the path is not known.
+    fn number(&self, term: usize) -> f64 {
+        match self.part {
+            None => self.numbers.number(self.step, term),
+            Some(theta) => levy(self.numbers, (self.step, term), theta).unwrap_or(f64::NAN),
         }
     }
 
@@ -144,7 +161,7 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
     /// The flow of one noise field, or of the sum of several of a group, for the times `√(2 k_B h) ξ_r`.
     pub(super) fn noise(&mut self, group: usize, terms: Range<usize>) -> Result<(), StepError> {
         let flow = self.system.flow();
-        let numbers: Vec<f64> = terms.clone().map(|r| self.numbers.number(self.step, r)).collect();
+        let numbers: Vec<f64> = terms.clone().map(|r| self.number(r)).collect();
         if numbers.iter().all(|xi| *xi == 0.0) {
             return Ok(());
         }

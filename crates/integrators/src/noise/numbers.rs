@@ -20,7 +20,7 @@
 //! or `−√3, √3, 0` where `⌊6 u₀/2⁶⁴⌋` is 0, 1, or larger. The coin of a step is the leading bit of `u₀`. Integers are the
 //! same on each machine and on each device, and Gaussian numbers to the round-off of its logarithm and cosine.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::fmt::Debug;
 
 use super::philox::philox;
@@ -32,6 +32,20 @@ pub trait Numbers: Clone + Debug + Sync {
 
     /// Whether the noise fields of a step are followed in the opposite order: a fair coin.
     fn is_backward(&self, step: u64) -> bool;
+
+    /// The number `ζ` of a place between the ends of a step, with the moments of [`number`](Self::number), for the Brownian path
+    /// [inside it](super::levy()); `None` without such numbers: then no state between the ends is known.
+    fn between(&self, step: u64, term: usize, place: u64) -> Option<f64> {
+        let _ = (step, term, place);
+        None
+    }
+
+    /// A number that is uniform in `(0, 1)`, for the [excursions](crate::Stepper::excursion) in a part of a step; `None` where numbers
+    /// are not Gaussian, or there are no such numbers.
+    fn uniform(&self, step: u64, part: u64) -> Option<f64> {
+        let _ = (step, part);
+        None
+    }
 
     /// The name in a checkpoint; a run is resumed with numbers of its name.
     fn name(&self) -> String;
@@ -48,6 +62,10 @@ pub enum Purpose {
     Coin = 1,
     /// The directions in which a model is tried.
     Trial = 2,
+    /// The number of a term at a place between the ends of a step.
+    Between = 3,
+    /// Whether a path has left a region and come back.
+    Excursion = 4,
 }
 
 /// The numbers of `(seed, path, step, term)` by Philox4x64-10.
@@ -66,6 +84,8 @@ pub struct Counter {
     seed: u64,
     path: u64,
     is_three_point: bool,
+    /// A step is that of `2^doublings` steps of the path.
+    doublings: u32,
 }
 
 /// `2⁻⁵²`.
@@ -74,7 +94,7 @@ const UNIT: f64 = 1.0 / (1_u64 << 52) as f64;
 impl Counter {
     /// The Gaussian numbers of a seed, on path 0.
     pub const fn new(seed: u64) -> Self {
-        Self { seed, path: 0, is_three_point: false }
+        Self { seed, path: 0, is_three_point: false, doublings: 0 }
     }
 
     /// Takes another path of the same seed.
@@ -90,9 +110,38 @@ impl Counter {
         Self { is_three_point: true, ..self }
     }
 
+    /// Takes the Brownian path of steps of size `h` in steps of size `2^doublings h`: the number of two steps in one is
+    /// `(ξ₁ + ξ₂)/√2`. Two runs on one path differ by the error of their steps, and hardly by chance.
+    #[must_use]
+    pub const fn coarsened(self, doublings: u32) -> Self {
+        Self { doublings: self.doublings + doublings, ..self }
+    }
+
+    /// The numbers of steps of half the size.
+    const fn halved(&self) -> Option<Self> {
+        match self.doublings.checked_sub(1) {
+            Some(doublings) => Some(Self { doublings, ..*self }),
+            None => None,
+        }
+    }
+
     /// The block of a step and a term.
     const fn block(&self, step: u64, term: u64, purpose: Purpose) -> [u64; 4] {
-        philox([self.seed, self.path], [step, term, purpose as u64, 0])
+        self.block_at(step, term, purpose, 0)
+    }
+
+    /// The block of a place of a step and a term.
+    const fn block_at(&self, step: u64, term: u64, purpose: Purpose, place: u64) -> [u64; 4] {
+        philox([self.seed, self.path], [step, term, purpose as u64, place])
+    }
+
+    /// The number of a block.
+    fn of_block(&self, [first, second, ..]: [u64; 4]) -> f64 {
+        if self.is_three_point {
+            return three_point(first);
+        }
+        let [radius, angle] = [uniform(first), uniform(second)];
+        (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
     }
 }
 
@@ -112,21 +161,42 @@ fn three_point(u: u64) -> f64 {
 
 impl Numbers for Counter {
     fn number(&self, step: u64, term: usize) -> f64 {
-        let [first, second, ..] = self.block(step, term as u64, Purpose::Term);
-        if self.is_three_point {
-            return three_point(first);
+        if let Some(halved) = self.halved() {
+            let [first, second] = [0, 1].map(|half| halved.number(2 * step + half, term));
+            return (first + second) * FRAC_1_SQRT_2;
         }
-        let [radius, angle] = [uniform(first), uniform(second)];
-        (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
+        self.of_block(self.block(step, term as u64, Purpose::Term))
     }
 
     fn is_backward(&self, step: u64) -> bool {
-        self.block(step, 0, Purpose::Coin)[0] >> 63 == 1
+        self.block(step << self.doublings, 0, Purpose::Coin)[0] >> 63 == 1
+    }
+
+    fn between(&self, step: u64, term: usize, place: u64) -> Option<f64> {
+        let Some(halved) = self.halved() else {
+            return Some(self.of_block(self.block_at(step, term as u64, Purpose::Between, place)));
+        };
+        // The digits of a place after its first one say the way to it: 0 for an earlier half.
+        let Some(last) = place.checked_ilog2()?.checked_sub(1) else {
+            let [first, second] = [0, 1].map(|half| halved.number(2 * step + half, term));
+            return Some((first - second) * FRAC_1_SQRT_2);
+        };
+        let half = (place >> last) & 1;
+        halved.between(2 * step + half, term, (place & ((1 << last) - 1)) | (1 << last))
+    }
+
+    fn uniform(&self, step: u64, part: u64) -> Option<f64> {
+        let number = || uniform(self.block(step, part, Purpose::Excursion)[0]);
+        (!self.is_three_point).then(number)
     }
 
     fn name(&self) -> String {
         let law = if self.is_three_point { "three-point" } else { "Gaussian" };
-        format!("seed {}, path {}, {law}", self.seed, self.path)
+        let steps = match self.doublings {
+            0 => String::new(),
+            doublings => format!(", 2^{doublings} steps in one"),
+        };
+        format!("seed {}, path {}, {law}{steps}", self.seed, self.path)
     }
 }
 
@@ -176,6 +246,9 @@ mod tests {
         assert_eq!(Counter::new(1).number(5, 2).to_bits(), base.to_bits());
     }
 
+    const PURPOSES: [Purpose; 5] =
+        [Purpose::Term, Purpose::Coin, Purpose::Trial, Purpose::Between, Purpose::Excursion];
+
     #[test]
     fn no_counter_comes_twice() {
         // At the powers of two, where a word that is too narrow wraps, and beside them.
@@ -185,7 +258,7 @@ mod tests {
         };
         let counter = Counter::new(1);
         let mut blocks: Vec<[u64; 4]> = Vec::new();
-        for purpose in [Purpose::Term, Purpose::Coin, Purpose::Trial] {
+        for purpose in PURPOSES {
             for step in edges() {
                 blocks.extend(edges().map(|term| counter.block(step, term, purpose)));
             }
@@ -193,7 +266,11 @@ mod tests {
         blocks.sort_unstable();
         let count = blocks.len();
         blocks.dedup();
-        assert!(count == 3 * 49 * 49 && blocks.len() == count, "{} of {count}", blocks.len());
+        assert!(
+            count == PURPOSES.len() * 49 * 49 && blocks.len() == count,
+            "{} of {count}",
+            blocks.len()
+        );
         let coins = (0..64).filter(|step| counter.is_backward(*step)).count();
         let leading =
             (0..64).filter(|step| counter.block(*step, 0, Purpose::Term)[0] >> 63 == 1).count();

@@ -5,10 +5,11 @@ use super::fluctuating::Fluctuating;
 use super::moves::Moves;
 use super::numbers::{Counter, Numbers};
 use super::system::Noisy;
+use crate::explicit::along;
 use crate::step::evidence::RESOLVED;
 use crate::step::{
-    Effort, Element, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError, Saved,
-    StepEnds, StepError, StepStart, Stepper, Taken,
+    Effort, Element, Excursion, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError,
+    Saved, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// A way to sample a system with noise: [`RandomFlow`](super::RandomFlow) and
@@ -64,6 +65,12 @@ impl<S> Sampler<S> {
     #[must_use]
     pub fn path(self, path: u64) -> Self {
         Self { numbers: self.numbers.path(path), ..self }
+    }
+
+    /// Takes steps of size `2^doublings h` on the Brownian path of steps of size `h`, see [`Counter::coarsened`].
+    #[must_use]
+    pub fn coarsened(self, doublings: u32) -> Self {
+        Self { numbers: self.numbers.coarsened(doublings), ..self }
     }
 
     /// Takes numbers of [three points](Counter::three_point).
@@ -223,7 +230,38 @@ where
         None
     }
 
-    /// None: what lies between two states is a path of its own.
+    fn on_path(
+        &self,
+        start: &StepStart<'_, Noisy<F, U>>,
+        [h, theta]: [f64; 2],
+        memory: &NoiseMemory,
+    ) -> Option<Element<F>> {
+        let step = memory.drawn.checked_sub(1)?;
+        self.numbers.between(step, 0, 1)?;
+        let mut moves = Moves::from(start, h, (&self.numbers, step)).part(theta);
+        self.sampling.sample(&mut moves).ok()?;
+        Some(moves.taken().x)
+    }
+
+    /// By the Brownian bridge (Baldi 1995; Gobet 2000): a function with the values `g₀`, `g₁` of one sign at the ends of a time `δ` has
+    /// had the other sign in between with the probability `exp(−2 g₀ g₁/v)`, where `v = 2 k_B δ Σ_r ⟨dg, X_r⟩²` is its variance.
+    fn excursion(
+        &self,
+        start: &StepStart<'_, Noisy<F, U>>,
+        h: f64,
+        memory: &NoiseMemory,
+        excursion: &Excursion<'_, Element<F>>,
+    ) -> Option<bool> {
+        let [from, to] = excursion.fractions;
+        let step = memory.drawn.checked_sub(1)?;
+        // One number for all functions: a path beyond a far level is beyond a near one.
+        let uniform = self.numbers.uniform(step, from.to_bits())?;
+        let variance = variance(start.flow, (to - from) * h, excursion);
+        let [before, after] = excursion.values;
+        Some(uniform < (-2.0 * before * after / variance).exp())
+    }
+
+    /// None: the state lies on a [path](Stepper::on_path).
     fn between(
         &self,
         _: &StepEnds<'_, Noisy<F, U>>,
@@ -237,6 +275,26 @@ where
         StepError::Method { time, error: MethodError::new(NoiseError::HasNoBetween) }
     }
 }
+
+/// Computes the variance `2 k_B δ Σ_r ⟨dg, X_r⟩²` that the noise of a time `δ` gives to a function, by differences over a part of the way
+/// of each noise field. A field that leaves the domain there does not count.
+fn variance<F: Fluctuating<U>, U>(
+    system: &Noisy<F, U>,
+    time: f64,
+    &Excursion { from, function, .. }: &Excursion<'_, Element<F>>,
+) -> f64 {
+    let (flow, strength) = (system.flow(), 2.0 * system.noise().k_b * time);
+    let terms = flow.groups().into_iter().flatten();
+    let slopes = terms.map(|r| {
+        let field = |x: &Element<F>| flow.noise(x, r..r + 1, (strength, &|_| 1.0));
+        let [up, down] = [WAY, -WAY].map(|s| along(flow, from, s, field).map(|x| function(&x)));
+        up.zip(down).map_or(0.0, |(up, down)| (up - down) / (2.0 * WAY))
+    });
+    slopes.filter(|slope| slope.is_finite()).map(|slope| slope * slope).sum()
+}
+
+/// The part of the way of a noise field in a step over which a function is differentiated.
+const WAY: f64 = 1.0 / 16.0;
 
 #[cfg(test)]
 mod tests {

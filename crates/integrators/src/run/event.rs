@@ -6,6 +6,8 @@
 //! need of a point, and is looked at more often. Where that shows a change of sign, the states of the output decide: first at
 //! the points around the change, then in a bracket that is narrowed to the last digits of the time.
 
+pub(crate) mod path;
+
 use std::any::{Any, type_name};
 use std::fmt;
 use std::sync::Arc;
@@ -60,7 +62,8 @@ pub struct Event<M: StateSpace> {
     pub index: usize,
     /// Whether the function rises through zero.
     pub rises: bool,
-    /// The state there. The function is zero or has its later sign.
+    /// The state there. The function is zero or has its later sign, but on a path with noise that was [beyond
+    /// zero](crate::Watched::bridged) between two looks.
     pub state: State<M>,
     /// The change of the state, if one was [asked for](crate::Watched::jump).
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
@@ -102,6 +105,8 @@ pub(crate) struct Request {
     pub(crate) jump: Option<JumpRequest>,
     /// The longest time between two looks, if one was asked for.
     pub(crate) resolution: Option<f64>,
+    /// Whether changes of sign between two looks at a path with noise count that come in pairs.
+    pub(crate) bridged: bool,
     /// Whether the function was given with the time.
     is_in_time: bool,
     /// The type of the points, and the [`Function`] of them.
@@ -124,6 +129,7 @@ impl Request {
             stops: false,
             jump: None,
             resolution: None,
+            bridged: false,
             is_in_time,
             point: type_name::<P>(),
             expected: None,
@@ -185,7 +191,7 @@ impl fmt::Debug for Request {
 /// Compares the functions by identity, and their options.
 impl PartialEq for Request {
     fn eq(&self, other: &Self) -> bool {
-        let options = |r: &Self| (r.rising, r.falling, r.stops, r.resolution);
+        let options = |r: &Self| (r.rising, r.falling, r.stops, r.resolution, r.bridged);
         let jumps = match (&self.jump, &other.jump) {
             (Some(a), Some(b)) => a.is(b),
             (a, b) => a.is_none() && b.is_none(),
@@ -379,12 +385,14 @@ impl<M: StateSpace> Events<M> {
             Some(v) => flow.moved(end, &v.map(|v| later * v)),
             None => end.clone(),
         };
-        let step = InStep { ends, h, moves, inside: &inside, point: &mut point, ahead: &mut ahead };
-        self.in_step(step, output)
+        let mut step =
+            InStep { ends, h, moves, inside: &inside, point: &mut point, ahead: &mut ahead };
+        let times = ends.map(|state| state.time);
+        self.in_step(times, &mut |watched, limit| watched.look(&mut step, limit, output))
     }
 
-    /// Looks for events in a step.
-    fn in_step(&mut self, mut step: InStep<'_, M>, output: &mut Output<'_, M>) -> Option<Found<M>> {
+    /// Looks for events in a step between two times.
+    fn in_step(&mut self, [start, end]: [f64; 2], look: &mut Look<'_, M>) -> Option<Found<M>> {
         // Those that end the step first: behind them no other one is looked for.
         let mut indices: Vec<usize> = (0..self.0.len()).collect();
         indices.sort_by_key(|&index| !self.0[index].interrupts());
@@ -392,7 +400,7 @@ impl<M: StateSpace> Events<M> {
         let (mut thetas, mut found) = (Vec::new(), Vec::new());
         for index in indices {
             let watched = &mut self.0[index];
-            let Changes { changes, unsure: first } = watched.look(&mut step, limit, output)?;
+            let Changes { changes, unsure: first } = look(watched, limit)?;
             let name = &watched.request.name;
             unsure.extend(first.map(|theta| (Arc::clone(name), theta)));
             for Change { theta, rises, state } in changes {
@@ -405,7 +413,8 @@ impl<M: StateSpace> Events<M> {
             }
         }
         unsure.retain(|(_, theta)| *theta <= limit);
-        let unsure = unsure.into_iter().map(|(name, theta)| (name, step.time(theta))).collect();
+        let time = |theta: f64| start + theta * (end - start);
+        let unsure = unsure.into_iter().map(|(name, theta)| (name, time(theta))).collect();
         let order = in_order(&thetas);
         let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
         let end = events.iter().position(|event| self.0[event.index].interrupts());
@@ -503,6 +512,9 @@ struct InStep<'a, M: StateSpace> {
     /// The point at a time after the end, along the velocity.
     ahead: &'a mut dyn FnMut(f64) -> M::Element,
 }
+
+/// Looks at a function in a step up to a fraction, for its changes of sign.
+type Look<'a, M> = dyn FnMut(&mut Watched<M>, f64) -> Option<Changes<M>> + 'a;
 
 /// A point at a fraction of a step; `None` if it is not known.
 type PointAt<'a, M> = dyn FnMut(f64, &mut Output<'_, M>) -> Option<<M as StateSpace>::Element> + 'a;

@@ -5,16 +5,19 @@ use metriplectic_dynamics::SecondLaw;
 use crate::run::corners::{self, Fixed};
 use crate::run::course::Course;
 use crate::run::ending::Ending;
-use crate::run::event::{Event, Found, Interruption};
+use crate::run::event::path::Path;
+use crate::run::event::{Event, Events, Found, Interruption};
 use crate::run::rounding::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::stepping::{AnyStepper, Stepping};
 use crate::run::steps::Steps;
-use crate::run::watching::Watching;
+use crate::run::watching::{StepBefore, Watching};
 use crate::step::dense::{Target, between, says_between};
-use crate::step::{Element, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper};
+use crate::step::{
+    Element, Excursion, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper,
+};
 
 impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other
@@ -136,6 +139,26 @@ impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     }
 }
 
+/// The last step of a run with noise.
+struct OnPath<'s, 'a, F: Flow + ?Sized> {
+    course: &'s Course<'a, F>,
+    method: &'s mut dyn AnyStepper<F>,
+}
+
+impl<F: Flow + ?Sized> Path<F::Space> for OnPath<'_, '_, F> {
+    fn state(&mut self, theta: f64) -> Option<State<F::Space>> {
+        self.course.inside(theta, self.method)
+    }
+
+    fn has_excursion(&mut self, excursion: &Excursion<'_, Element<F>>) -> Option<bool> {
+        let StepBefore { h, in_parts, .. } = self.course.before;
+        if in_parts {
+            return None;
+        }
+        self.method.excursion(&self.course.start_of_last(), h, excursion)
+    }
+}
+
 impl<F: Flow + ?Sized> Course<'_, F> {
     /// Takes up the outputs and events of a schedule.
     pub(super) fn watch(&mut self, schedule: Schedule) -> Result<(), SpanError> {
@@ -179,6 +202,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
     fn inside(&self, theta: f64, method: &mut dyn AnyStepper<F>) -> Option<State<F::Space>> {
         if theta >= 1.0 {
             return Some(self.state.clone());
+        }
+        if self.is_noisy() {
+            return self.on_path(theta, method);
         }
         let (has_entropy, reference) = (self.has_entropy(), self.reference(self.before.entropy));
         let Self { flow, before, state, values, progress, .. } = self;
@@ -268,18 +294,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
     ) -> Option<Option<Vec<(usize, bool)>>> {
         let (mut stopped_at, mut jumps) = (None, None);
         if !watching.events.is_empty() {
-            let ends = [self.before.state.clone(), self.state.clone()];
-            let (laws, reference) = (
-                [self.before.values.clone(), self.values.clone()],
-                self.reference(self.before.entropy),
-            );
-            let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
-            let (flow, h) = (self.flow, self.before.h);
-            let step = StepEnds { flow, x, end, h, values, reference: &reference };
-            let Found { events, end, unsure } =
-                watching
-                    .events
-                    .of_step(&step, ends.each_ref(), &mut |theta| self.inside(theta, method))?;
+            let Found { events, end, unsure } = self.events(&mut watching.events, method)?;
             if let (Some(event), Some(end)) = (events.last(), end) {
                 stopped_at = Some(event.state.clone());
                 let index = event.index;
@@ -315,6 +330,57 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             }
         }
         Some(jumps)
+    }
+
+    /// The events of the last step.
+    fn events(
+        &self,
+        events: &mut Events<F::Space>,
+        method: &mut dyn AnyStepper<F>,
+    ) -> Option<Found<F::Space>> {
+        if self.is_noisy() {
+            let ends = [&self.before.state, &self.state];
+            return events.of_path(ends, &mut OnPath { course: self, method });
+        }
+        let ends = [self.before.state.clone(), self.state.clone()];
+        let (laws, reference) = (
+            [self.before.values.clone(), self.values.clone()],
+            self.reference(self.before.entropy),
+        );
+        let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
+        let (flow, h) = (self.flow, self.before.h);
+        let step = StepEnds { flow, x, end, h, values, reference: &reference };
+        events.of_step(&step, ends.each_ref(), &mut |theta| self.inside(theta, method))
+    }
+
+    /// Whether the run is a path with noise.
+    const fn is_noisy(&self) -> bool {
+        self.certificate.noise.is_some()
+    }
+
+    /// The start of the last step.
+    fn start_of_last(&self) -> StepStart<'_, F> {
+        let StepBefore { state, values, entropy, .. } = &self.before;
+        let reference = self.reference(*entropy);
+        let (x, values) = (&state.point, values.clone());
+        StepStart { flow: self.flow, x, time: state.time, values, reference, allowed: None }
+    }
+
+    /// The state at a fraction of the last step of a path with noise; `None` if its numbers do not say it, and in a step that a corner cuts.
+    fn on_path(&self, theta: f64, method: &mut dyn AnyStepper<F>) -> Option<State<F::Space>> {
+        let StepBefore { state, h, in_parts, .. } = &self.before;
+        if theta <= 0.0 {
+            return Some(state.clone());
+        }
+        if *in_parts {
+            return None;
+        }
+        let point = method.on_path(&self.start_of_last(), [*h, theta])?;
+        let time = (state.time + theta * (self.state.time - state.time)).min(self.state.time);
+        let point = self.flow.clocked(&point, time).unwrap_or(point);
+        let Laws { energy, entropy, .. } = self.flow.laws(&point);
+        let known = State { step: state.step, time, point, energy, entropy };
+        energy.is_finite().then_some(known)
     }
 
     /// The state at a time, after another one in the same step and before the state `last`. Where its entropy is beyond

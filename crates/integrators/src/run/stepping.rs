@@ -1,7 +1,7 @@
 //! A method at work, as the parts of a run see it that are not its loop.
 
 use crate::step::{
-    AnyFlow, Element, Flow, Memory as _, StepEnds, StepError, StepStart, Stepper, Taken,
+    AnyFlow, Element, Excursion, Flow, Memory as _, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// A method with its memory, for a flow of which only the states and the numbers are known.
@@ -17,6 +17,17 @@ pub(super) trait AnyStepper<F: Flow + ?Sized> {
 
     /// Returns the error of a request for a state inside a step where there is none.
     fn nothing_between(&self, time: f64, h: f64) -> StepError;
+
+    /// Returns the state at a fraction of a step that was taken on a random path ([`Stepper::on_path`]).
+    fn on_path(&self, start: &StepStart<'_, F>, sizes: [f64; 2]) -> Option<Element<F>>;
+
+    /// Draws whether a function was beyond zero between two times of a step that was taken ([`Stepper::excursion`]).
+    fn excursion(
+        &self,
+        start: &StepStart<'_, F>,
+        h: f64,
+        excursion: &Excursion<'_, Element<F>>,
+    ) -> Option<bool>;
 
     /// Forgets what is extrapolated across a corner or a jump.
     fn restart(&mut self);
@@ -35,9 +46,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Steppin
         start: &StepStart<'_, AnyFlow<'a, F>>,
         h: f64,
     ) -> Result<Taken<AnyFlow<'a, F>>, StepError> {
-        let &StepStart { x, time, ref values, ref reference, ref allowed, .. } = start;
-        let (flow, values, reference) = (self.flow, values.clone(), reference.clone());
-        let start = StepStart { flow, x, time, values, reference, allowed: allowed.clone() };
+        let start = start_of(self.flow, start);
         let Taken { x, values, evidence, effort } = self.method.step(&start, h, self.memory)?;
         Ok(Taken { x, values, evidence, effort })
     }
@@ -57,7 +66,34 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Steppin
         self.method.nothing_between(time, h)
     }
 
+    fn on_path(
+        &self,
+        start: &StepStart<'_, AnyFlow<'a, F>>,
+        sizes: [f64; 2],
+    ) -> Option<Element<F>> {
+        self.method.on_path(&start_of(self.flow, start), sizes, self.memory)
+    }
+
+    fn excursion(
+        &self,
+        start: &StepStart<'_, AnyFlow<'a, F>>,
+        h: f64,
+        excursion: &Excursion<'_, Element<F>>,
+    ) -> Option<bool> {
+        self.method.excursion(&start_of(self.flow, start), h, self.memory, excursion)
+    }
+
     fn restart(&mut self) {
         *self.memory = self.memory.restarted();
     }
+}
+
+/// The start of a step of the flow itself.
+fn start_of<'s, F: Flow + ?Sized>(
+    flow: &'s F,
+    start: &StepStart<'s, AnyFlow<'_, F>>,
+) -> StepStart<'s, F> {
+    let &StepStart { x, time, ref values, ref reference, ref allowed, .. } = start;
+    let (values, reference) = (values.clone(), reference.clone());
+    StepStart { flow, x, time, values, reference, allowed: allowed.clone() }
 }

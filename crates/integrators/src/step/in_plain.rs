@@ -9,7 +9,7 @@ use metriplectic_manifolds::PointError;
 use super::panicked::{Panicked, caught};
 use super::plain_method::{PlainMemory, PlainMethod};
 use super::{
-    Control, Directions, Effort, Element, Entries, EventExchange, Flow, FlowError, Laws,
+    Control, Directions, Effort, Element, Entries, EventExchange, Excursion, Flow, FlowError, Laws,
     LedgerErrors, LedgerSummary, MethodError, NoiseSummary, PlainFlow, PlainNumbers, Promises,
     Recheck, Refusal, Scales, StartError, StepEnds, StepError, StepStart, Stepper, Taken, Values,
     Written, both, dense,
@@ -331,6 +331,37 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
 
     fn nothing_between(&self, time: f64, h: f64) -> StepError {
         self.method.nothing_between(time, h)
+    }
+
+    fn on_path(
+        &self,
+        start: &StepStart<'_, PlainFlow<'_>>,
+        sizes: [f64; 2],
+        memory: &PlainMemory,
+    ) -> Option<Entries> {
+        let inside =
+            || self.from(start, |start| self.method.on_path(start, sizes, memory.after_a_step()?));
+        let inside =
+            if const { F::CATCHES_PANICS } { caught(inside).ok().flatten() } else { inside() };
+        inside.map(|x| F::write(&x))
+    }
+
+    fn excursion(
+        &self,
+        start: &StepStart<'_, PlainFlow<'_>>,
+        h: f64,
+        memory: &PlainMemory,
+        &Excursion { from, fractions, values, function }: &Excursion<'_, Entries>,
+    ) -> Option<bool> {
+        let drawn = || {
+            let function = |x: &Element<F>| function(&F::write(x));
+            let (from, function) = (&self.at(from), &function);
+            let excursion = Excursion { from, fractions, values, function };
+            self.from(start, |start| {
+                self.method.excursion(start, h, memory.after_a_step()?, &excursion)
+            })
+        };
+        if const { F::CATCHES_PANICS } { caught(drawn).ok().flatten() } else { drawn() }
     }
 
     fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {

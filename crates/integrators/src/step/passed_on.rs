@@ -34,6 +34,27 @@ macro_rules! passed_on {
             $crate::step::Stepper::<$flow>::nothing_between(&$other, time, h)
         }
 
+        fn on_path(
+            &self,
+            start: &$crate::step::StepStart<'_, $flow>,
+            sizes: [f64; 2],
+            memory: &Self::Memory,
+        ) -> Option<$crate::step::Element<$flow>> {
+            let $this = self;
+            $other.on_path(start, sizes, memory)
+        }
+
+        fn excursion(
+            &self,
+            start: &$crate::step::StepStart<'_, $flow>,
+            h: f64,
+            memory: &Self::Memory,
+            excursion: &$crate::step::Excursion<'_, $crate::step::Element<$flow>>,
+        ) -> Option<bool> {
+            let $this = self;
+            $other.excursion(start, h, memory, excursion)
+        }
+
         fn check(&self, follows_tolerance: bool) -> Result<(), $crate::step::MethodError> {
             let $this = self;
             $crate::step::Stepper::<$flow>::check(&$other, follows_tolerance)

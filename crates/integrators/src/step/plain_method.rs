@@ -5,8 +5,8 @@ use std::fmt::Debug;
 
 use super::plain::{Directions, Entries};
 use super::{
-    Control, Element, LimitingSites, Memory, MethodError, NoiseSummary, PlainFlow, Promises,
-    Refusal, RestoreError, Saved, StepEnds, StepError, StepStart, Stepper, Taken,
+    Control, Element, Excursion, LimitingSites, Memory, MethodError, NoiseSummary, PlainFlow,
+    Promises, Refusal, RestoreError, Saved, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// A method for flows in plain numbers, of which nothing else is known: a [`Stepper`] behind a pointer.
@@ -31,6 +31,23 @@ pub(crate) trait PlainMethod {
 
     /// [`Stepper::nothing_between`].
     fn nothing_between(&self, time: f64, h: f64) -> StepError;
+
+    /// [`Stepper::on_path`].
+    fn on_path(
+        &self,
+        start: &StepStart<'_, PlainFlow<'_>>,
+        sizes: [f64; 2],
+        memory: &PlainMemory,
+    ) -> Option<Entries>;
+
+    /// [`Stepper::excursion`].
+    fn excursion(
+        &self,
+        start: &StepStart<'_, PlainFlow<'_>>,
+        h: f64,
+        memory: &PlainMemory,
+        excursion: &Excursion<'_, Entries>,
+    ) -> Option<bool>;
 
     /// [`Stepper::promises`].
     fn promises(&self, flow: &PlainFlow<'_>) -> Promises;
@@ -112,6 +129,25 @@ impl<'a> Stepper<PlainFlow<'a>> for &dyn PlainMethod {
 
     fn nothing_between(&self, time: f64, h: f64) -> StepError {
         (**self).nothing_between(time, h)
+    }
+
+    fn on_path(
+        &self,
+        start: &StepStart<'_, PlainFlow<'a>>,
+        sizes: [f64; 2],
+        memory: &PlainMemory,
+    ) -> Option<Entries> {
+        (**self).on_path(start, sizes, memory)
+    }
+
+    fn excursion(
+        &self,
+        start: &StepStart<'_, PlainFlow<'a>>,
+        h: f64,
+        memory: &PlainMemory,
+        excursion: &Excursion<'_, Entries>,
+    ) -> Option<bool> {
+        (**self).excursion(start, h, memory, excursion)
     }
 
     fn promises(&self, flow: &PlainFlow<'a>) -> Promises {

@@ -45,6 +45,27 @@ pub struct StepEnds<'a, F: Flow + ?Sized> {
     pub reference: &'a Laws<F::Numbers>,
 }
 
+/// Two times of a step, between which a function of the state may have left its sign and come back.
+pub struct Excursion<'a, X> {
+    /// The state at the first time.
+    pub from: &'a X,
+    /// Both times as fractions of the step.
+    pub fractions: [f64; 2],
+    /// The values of the function, of one sign.
+    pub values: [f64; 2],
+    /// The function at the first time.
+    pub function: &'a dyn Fn(&X) -> f64,
+}
+
+impl<X> std::fmt::Debug for Excursion<'_, X> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Excursion")
+            .field("fractions", &self.fractions)
+            .field("values", &self.values)
+            .finish_non_exhaustive()
+    }
+}
+
 /// A step that was taken.
 #[derive(Clone, Debug)]
 pub struct Taken<F: Flow + ?Sized> {

@@ -1,8 +1,9 @@
 //! The interface between runs and methods.
 
 use super::{
-    Compiled, Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, NoiseSummary,
-    Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
+    Compiled, Control, Effort, Element, Excursion, Flow, LimitingSites, Memory, MethodError,
+    NoiseSummary, Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense,
+    name_of,
 };
 
 /// A one-step method.
@@ -62,6 +63,31 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
     /// Returns the error of a request for a state inside a step where there is none.
     fn nothing_between(&self, time: f64, h: f64) -> StepError {
         StepError::NothingBetween { time, h }
+    }
+
+    /// Returns the state at the fraction `θ` of a step of size `h` that was taken, on the random path that belongs to its numbers, from
+    /// the memory after it; `None` of a method without random numbers, or whose numbers have no values there.
+    fn on_path(
+        &self,
+        start: &StepStart<'_, F>,
+        [h, theta]: [f64; 2],
+        memory: &Self::Memory,
+    ) -> Option<Element<F>> {
+        let _ = (start, h, theta, memory);
+        None
+    }
+
+    /// Draws whether a function that has one sign at two times of a step has the other one between them, from the memory after the
+    /// step; `None` as for [`on_path`](Self::on_path).
+    fn excursion(
+        &self,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &Self::Memory,
+        excursion: &Excursion<'_, Element<F>>,
+    ) -> Option<bool> {
+        let _ = (start, h, memory, excursion);
+        None
     }
 
     /// Refuses options with which no run can start, of steps that follow a tolerance or have one size.

@@ -79,6 +79,10 @@ pub trait Tangents: Sized {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
+        // Where a path ends a step beyond the event, the time of the event has no derivative.
+        if self.noise(system.as_flow()).is_some() && !schedule.watch.events.is_empty() {
+            return Err(TangentError::Broken { what: "events on a path with noise" });
+        }
         let steps = self.steps(system.as_flow(), x0, schedule)?;
         let laws = in_wide_room::<D, Self, _>(system, || system.wide_rows(&steps.state().point));
         let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());

@@ -163,6 +163,10 @@ where
             _ => None,
         };
         let at_end = asked.iter().position(|(step, _)| *step == end.step).unwrap_or(asked.len());
+        if at_end > 0 && self.certificate().noise.is_some() {
+            // A step of that fraction has other numbers than the path.
+            return Err(TangentError::Broken { what: "outputs inside steps of a path with noise" });
+        }
         for &(step, time) in &asked[..at_end] {
             let (point, moved) = self.part((last, again), theta(time)).map_err(failed)?;
             inside.outputs.push(self.at(step, time, point, moved.carried));

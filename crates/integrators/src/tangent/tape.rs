@@ -93,6 +93,11 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
                 states.push(asked.clone());
                 continue;
             }
+            if self.steps.certificate().noise.is_some() {
+                // A step of that fraction has other numbers than the path.
+                let what = "outputs inside steps of a path with noise";
+                return Err(TangentError::Broken { what });
+            }
             let theta = (asked.time - before.time) / (end.time - before.time);
             let (point, parts) = inside(method, (&last, again), theta).map_err(failed)?;
             step.outputs.push(parts);

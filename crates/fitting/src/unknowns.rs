@@ -36,7 +36,7 @@ impl Unknown {
             return phi;
         }
         let ([lower, upper], [first, last]) = (self.bounds, self.range());
-        if phi == f64::NEG_INFINITY || phi == f64::INFINITY {
+        if phi.is_infinite() {
             phi.exp()
         } else if phi <= first {
             lower

@@ -1,7 +1,7 @@
 //! Runs of systems of tapes beside those of the same systems in the types of the library.
 
-use metriplectic::dynamics::bracket::{AreaForm, Zero};
 use metriplectic::dynamics::FieldDissipation;
+use metriplectic::dynamics::bracket::{AreaForm, Zero};
 use metriplectic::dynamics::exchange::Contact;
 use metriplectic::dynamics::system::Point;
 use metriplectic::dynamics::{

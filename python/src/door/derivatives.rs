@@ -257,7 +257,7 @@ impl Tangent {
     }
 }
 
-/// What is asked of a run with derivatives.
+/// A request for a run with derivatives.
 struct Asked {
     start: Vec<f64>,
     schedule: Schedule,

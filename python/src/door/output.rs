@@ -157,7 +157,7 @@ impl Output {
     ///
     /// # Errors
     ///
-    /// Those of the interpreter.
+    /// Errors of the interpreter.
     pub(crate) fn into_dict<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let Self { rows, events, certificate, ending } = self;
         let dict = rows.into_dict(py)?;

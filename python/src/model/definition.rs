@@ -61,7 +61,7 @@ pub enum Friction {
     /// No friction.
     #[default]
     None,
-    /// That of the metric, `K_w = κ (G*(w,w) G* − ♯w ♯wᵀ)`, which annihilates `w`; further invariants are projected out of it.
+    /// The dissipation of the metric, `K_w = κ (G*(w,w) G* − ♯w ♯wᵀ)`, which annihilates `w`; further invariants are projected out of it.
     Metric {
         /// The factor `κ ≥ 0`, a tape with the inputs `[x | t | θ]` and one output; 1 without it.
         factor: Option<Tape>,

@@ -39,11 +39,11 @@ impl<N: AsRef<[f64]> + AsMut<[f64]>> IndexMut<(usize, usize)> for Rows<N> {
 /// An inner product at a state, with an orthonormal coframe.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Inner<'a> {
-    /// That in which the frame of the chart is orthonormal.
+    /// The metric in which the frame of the chart is orthonormal.
     Canonical,
-    /// That in which these sizes are units.
+    /// The metric in which these sizes are units.
     Units(&'a [f64]),
-    /// That of a matrix `g = L Lᵀ`.
+    /// The metric of a matrix `g = L Lᵀ`.
     Factored {
         /// The factor, row by row.
         l: &'a [f64],

@@ -189,7 +189,7 @@ words: docstrings (need "typos --version" "cargo install typos-cli --locked")
 docstrings:
     #!/usr/bin/env bash
     set -euo pipefail
-    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{equations,fields,manifolds,dynamics,recording,integrators,lattices,ensembles,fitting,studies}/src python/src; then
+    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{equations,fields,manifolds,dynamics,recording,integrators,lattices,ensembles,fitting,models,studies}/src python/src; then
         echo 'begin these docstrings with a verb in the third person or with a noun' >&2
         exit 1
     fi

@@ -40,6 +40,7 @@
 //! The book in the folder `book/` of the repository (`mdbook serve book` shows it) is the introduction. It explains
 //! the methods, units, tolerances and each line of the certificate. The guides go on from here:
 //!
+//! - begin with a model of the literature from [`models`];
 //! - [choose](guide::choosing) bracket, dissipation and scheme;
 //! - write [your own metric](guide::your_own_metric), or [your own manifold](guide::your_own_manifold) in sixty lines;
 //! - prove the laws and orders of [methods with stages](guide::stages);
@@ -78,6 +79,7 @@ pub use metriplectic_fitting as fitting;
 pub use metriplectic_integrators as integrators;
 pub use metriplectic_lattices as lattices;
 pub use metriplectic_manifolds as manifolds;
+pub use metriplectic_models as models;
 pub use metriplectic_recording as recording;
 pub use nalgebra;
 

@@ -8,6 +8,9 @@ struct Introduction;
 #[doc = include_str!("../book/src/first_system.md")]
 struct FirstSystem;
 
+#[doc = include_str!("../book/src/models.md")]
+struct Models;
+
 #[doc = include_str!("../book/src/closures.md")]
 struct Closures;
 
@@ -28,6 +31,7 @@ struct OpenSystems;
 
 #[doc = include_str!("../book/src/sensitivities.md")]
 struct Sensitivities;
+
 #[doc = include_str!("../book/src/noise.md")]
 struct Noise;
 

@@ -6,6 +6,7 @@
 #[path = "models/stages.rs"]
 mod stages;
 
+use metriplectic::models::{ThermoelasticDoublePendulum, TwoGasContainers};
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
 use metriplectic_studies::{Claim, Guarantee, Order, scientific};
@@ -71,31 +72,15 @@ fn midpoint() -> (&'static str, Scheme<WeylMidpoint>, f64) {
     ("WeylMidpoint", Scheme::new(WeylMidpoint), 2.0)
 }
 
-/// Gruber, Gunzburger, Ju and Wang (2021), arXiv:2110.03442: `(q, p, S₁, S₂)` with
-/// `H = p²/2 + (e^{S₁}/q)^{2/3} + (e^{S₂}/(2 − q))^{2/3}` and heat conduction `g = 8`.
-fn entropy_containers() -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
-    let conduction = |_: &Vector4<Real>, w: &Vector4<Real>| {
-        // K = g b bᵀ/(T₁T₂)², b = (T₂, −T₁) on the entropies.
-        let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
-        b * b.transpose() * ((w.z * w.w).powi(-2) * 8.0)
-    };
-    let canonical =
-        matrix![0.0, 1.0, 0.0, 0.0; -1.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0];
-    System::on(Euclidean::<4>)
-        .bracket(Poisson::constant(canonical).expect("it is skew"))
-        .dissipation(FieldDissipation(conduction))
-        .energy(|x: &Vector4<Real>| {
-            let gas = |s: Real, volume: Real| ((s - volume.ln()) * (2.0 / 3.0)).exp();
-            x.y.powi(2) * 0.5 + gas(x.z, x.x) + gas(x.w, -x.x + 2.0)
-        })
-        .entropy(|x: &Vector4<Real>| x.z + x.w)
-        .build()
-        .expect("the containers are a system")
-}
+/// Gruber, Gunzburger, Ju and Wang (2023), arXiv:2204.08049: `(q, p, S₁, S₂)` with
+/// `H = p²/2 + (e^{S₁}/q)^{2/3} + (e^{S₂}/(2 − q))^{2/3}` and heat conduction `α = 8`.
+const CONTAINERS: TwoGasContainers =
+    TwoGasContainers { mass: 1.0, length: 2.0, gas: 1.0, temperature: 2.0 / 3.0, conductance: 8.0 };
 
 #[test]
 fn gas_containers_of_the_learning_literature() {
-    let (gas, start) = (entropy_containers(), vector![0.9, -0.4, 2.4, 2.0]);
+    let gas = CONTAINERS.system().expect("the containers are a system");
+    let start = vector![0.9, -0.4, 2.4, 2.0];
     assert!((gas.energy_at(&start) - 8.953_560_999_182_892).abs() < 1e-14);
     let [early, late] = by_order_8(&gas, &start, [8.0, 32.0]);
     let reference = [0.98124602254157, -0.08052345768301, 2.25535400537030, 2.23944457420009];
@@ -111,7 +96,7 @@ fn gas_containers_of_the_learning_literature() {
     let at_rest = (late.entropy - 4.496712416726).abs();
     println!("U {heat_error:.1e} and S {entropy_error:.1e} at t = 8, S {at_rest:.1e} at t = 32");
     // The references have 14 decimals, U has 13, and the last S has 12.
-    let source = "SciPy; the model of Gruber et al., arXiv:2110.03442";
+    let source = "SciPy; the model of Gruber et al., arXiv:2204.08049";
     for (what, error, most) in [
         ("(q, p, S₁, S₂), t = 8", [early_error, 2.26], 1e-13),
         ("(U₁, U₂), t = 8", [heat_error, 4.55], 2e-13),
@@ -280,7 +265,7 @@ fn kepler_keeps_its_ellipse() {
     assert!(run.certificate().keeps_energy() && turned < 1e-12, "{turned:.1e}");
 }
 
-/// Gruber, Gunzburger, Ju and Wang (2021): 250 masses and one entropy, of which each site has a share.
+/// Gruber, Gunzburger, Ju and Wang (2023): 250 masses and one entropy, of which each site has a share.
 #[test]
 fn the_thermoelastic_rod() {
     const MASSES: usize = 250;
@@ -313,7 +298,7 @@ fn the_thermoelastic_rod() {
         let off = values.into_iter().zip(reference).map(|(value, exact)| (value - exact).abs());
         let off: Vec<f64> = off.collect();
         // The references have 10 to 12 significant digits, S has 10 decimals.
-        let source = "SciPy; the model of Gruber et al., arXiv:2110.03442";
+        let source = "SciPy; the model of Gruber et al., arXiv:2204.08049";
         let state = off[..4].iter().copied().fold(0.0, f64::max);
         agrees(
             &format!("thermoelastic rod, t = {t}: q and p"),
@@ -363,32 +348,16 @@ fn a_short_rod_is_integrated_to_the_order_of_an_implicit_method() {
 /// `(q₁, q₂, p₁, p₂, s₁, s₂)` with the energies of Romero (2009) that fit their data, over their 200 steps of 0.3.
 #[test]
 fn the_double_pendulum_of_the_learning_literature() {
-    type Pendulum = SVector<Real, 10>;
-    let canonical = SMatrix::<f64, 10, 10>::from_fn(|i, j| {
-        f64::from(u8::from(i < 4 && j == i + 4)) - f64::from(u8::from(j < 4 && i == j + 4))
-    });
-    let threads = |x: &Pendulum| {
-        let squares = [x[0].powi(2) + x[1].powi(2), (x[2] - x[0]).powi(2) + (x[3] - x[1]).powi(2)];
-        let thread = |i: usize| {
-            let log = squares[i].ln() * 0.5 - [2.0_f64, 1.0][i].ln();
-            let heat = ((x[8 + i] - log * 0.087) / 5.0).exp_m1() * (5.0 * 300.0);
-            log.powi(2) * (0.5 * [0.019, 0.188][i]) + log * (0.087 * 300.0) + heat
-        };
-        thread(0) + thread(1)
+    let pendulum = ThermoelasticDoublePendulum {
+        masses: [1.0, 2.0],
+        lengths: [2.0, 1.0],
+        stiffness: [0.019, 0.188],
+        coupling: 0.087,
+        heat_capacity: 5.0,
+        temperature: 300.0,
+        conductance: 300.0,
     };
-    let pendulum = System::on(Euclidean::<10>)
-        .bracket(Poisson::constant(canonical).expect("it is skew"))
-        .energy(move |x: &Pendulum| {
-            (x[4].powi(2) + x[5].powi(2)) * 0.5 + (x[6].powi(2) + x[7].powi(2)) * 0.25 + threads(x)
-        })
-        .entropy(|x: &Pendulum| x[8] + x[9])
-        .dissipation(FieldDissipation(|_: &Pendulum, w: &Pendulum| {
-            let b = Pendulum::ith(8, w[9]) - Pendulum::ith(9, w[8]);
-            b * b.transpose() * ((w[8] * w[9]).recip() * 300.0)
-        }))
-        .momentum(|x: &Pendulum| x[0] * x[5] - x[1] * x[4] + x[2] * x[7] - x[3] * x[6])
-        .build()
-        .expect("the pendulum is a system");
+    let pendulum = pendulum.system().expect("the pendulum is a system");
     let start = SVector::from([4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2, 0.0, 0.0]);
     // Heat is exchanged 120 times in a unit of time.
     let exact = (0..10).try_fold(start, |x, _| flow(&pendulum, &x, 0.6)).expect("it has a flow");

@@ -37,7 +37,8 @@ fn mean_square(h: f64, (entry, before_noise): (usize, f64)) -> f64 {
     let mean = (motion(TIME) * START)[entry];
     if h == 0.0 {
         let all = motion(TIME);
-        return mean * mean + (THERMAL * (Matrix2::identity() - all * all.transpose()))[(entry, entry)];
+        return mean * mean
+            + (THERMAL * (Matrix2::identity() - all * all.transpose()))[(entry, entry)];
     }
     let [first, second] = [before_noise, 1.0 - before_noise].map(|part| motion(part * h));
     let noise = Matrix2::new(0.0, 0.0, 0.0, 2.0 * FRICTION * THERMAL * h);

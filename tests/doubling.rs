@@ -53,11 +53,13 @@ fn mean_square(h: f64, (entry, before_noise): (usize, f64)) -> f64 {
 macro_rules! measured {
     ($method:expr, $entry:expr, $h:expr, $paths:expr, $order:expr) => {{
         let oscillator = oscillator!();
+        let start = oscillator.flow().start(START);
+        let oscillator = oscillator.verified(&start).unwrap();
         let steps = (TIME / $h).round() as usize;
         let doubling = Doubling { h: $h, steps, paths: $paths, order: $order };
         let bias = doubling.measure(|path| {
             let method = path.sampler($method.seed(7));
-            let run = method.run(&oscillator, oscillator.flow().start(START), path.span())?;
+            let run = method.run(&oscillator, start.clone(), path.span())?;
             Ok(run.last().point.x[$entry].powi(2))
         });
         bias.unwrap()

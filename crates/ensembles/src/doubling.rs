@@ -33,7 +33,7 @@ use crate::estimate::Estimate;
 ///     let run = method.run(&body, vector![0.4, 0.5, 0.3], path.span())?;
 ///     Ok(run.last().point.norm_squared())
 /// })?;
-/// println!("{bias}"); // 0.6163 ± 0.0048 at h = 0.05, of which the bias is 0.000004 ± 0.000008; ..
+/// println!("{bias}");
 /// println!("take h = {:.2} for a bias below 1e-4", bias.step_for(1e-4)?);
 /// # Ok(())
 /// # }

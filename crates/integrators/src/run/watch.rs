@@ -319,9 +319,9 @@ impl Watched {
     /// a number of its own, so the path stays as it is. Both changes are at the later look, in the directions that were asked for.
     ///
     /// The mean of a first passage time is off by the order 1/2 in `h` without it where noise moves the function, and 1 with it. Where
-    /// noise reaches the function by other entries alone, as the position of a particle with a momentum, the order is 1 without
-    /// it. A look takes two flows of each noise field, so the cost is that of as many steps as there are terms. In a run without noise
-    /// nothing changes.
+    /// noise reaches the function by other entries alone, as the position of a particle by its momentum, `v` is zero and nothing
+    /// changes; nor does it in a run without noise. A look takes two flows of each noise field, so the cost is that of as many steps as
+    /// there are terms. Numbers of three points are refused ([`NoiseError::HasNoBetween`](crate::NoiseError::HasNoBetween)).
     ///
     /// ```
     /// use metriplectic_integrators::{Span, Watch};

@@ -1,4 +1,5 @@
 //! The bias of means over noisy paths, by steps that are doubled on the same paths: against the exact law of a damped oscillator.
+#![allow(clippy::cast_possible_truncation, reason = "a number of steps is small")]
 
 use metriplectic::ensembles::{DoublingError, StepAdviceError, StepBias};
 use metriplectic::prelude::*;
@@ -86,7 +87,7 @@ fn assert_bias(bias: &StepBias, before_noise: (usize, f64), order: f64) {
     assert!(bias.bias.standard_error < 0.2 * bias.means[0].standard_error, "{bias}");
     // A step that is advised has the bias that was asked for, and one twice as long has not.
     for wanted in [0.5 * (here - exact).abs(), 0.1 * (here - exact).abs()] {
-        let advised = bias.step_for(wanted).unwrap();
+        let advised = bias.step_for(wanted).expect("a step");
         let whole = TIME / (TIME / advised).ceil();
         let off = |h: f64| (mean_square(h, before_noise) - exact).abs();
         println!("h = {advised:.4} for {wanted:.2e}: {:.2e}", off(whole));

@@ -485,7 +485,7 @@ fn what_numbers_do_not_say_is_refused() {
     let own = RandomFlow(DormandPrince5).numbers(Plain(Counter::new(1)));
     let span = Span::steps(0.1, 20);
     let level = |x: &Particle| x.x.x - 0.31;
-    let fault = |run: Result<Trajectory<_>, RunError<_>>| match run.err().expect("it is refused") {
+    let fault = |run: Result<Trajectory<_>, RunError<_>>| match run.expect_err("it is refused") {
         RunError::Step { cause: StepError::Method { error, .. }, .. } => {
             *error.downcast_ref::<NoiseError>().expect("it is a fault of noise")
         }

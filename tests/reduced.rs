@@ -296,7 +296,7 @@ const ROD: usize = 2 * MASSES + 1;
 
 /// The states of the rod at multiples of `dt`, by the classical method: its masses do not act on each other.
 fn rod_run(start: &DVector<f64>, dt: f64, outputs: usize) -> Vec<DVector<f64>> {
-    classical(|x| rod_velocity(x), start.clone(), (dt, outputs, 4))
+    classical(rod_velocity, start.clone(), (dt, outputs, 4))
 }
 
 fn rod_velocity(x: &DVector<f64>) -> DVector<f64> {

@@ -1,4 +1,4 @@
-//! Models of the literature, ready made: parameters in physical units in, a [`System`](metriplectic_dynamics::System) out.
+//! Models of the literature, ready made: parameters in physical units in, a [`System`] out.
 //!
 //! | model | state | with |
 //! |---|---|---|
@@ -11,6 +11,11 @@
 //! Each model is a struct of its parameters, in any consistent units: its metric is made of them, so that other units give the same
 //! run. `system()` checks the
 //! parameters, and is ten lines of closures that a model of your own may begin with.
+
+#![allow(
+    clippy::type_complexity,
+    reason = "the type of a system lists its parts, and a name for it would hide them"
+)]
 
 mod damped_piston;
 mod damped_rigid_body;

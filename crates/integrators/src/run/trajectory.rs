@@ -93,8 +93,8 @@ impl<M: StateSpace> Trajectory<M> {
         paired(times, &recorded, (self.ending, self.events.last().map(|event| &event.name)))
     }
 
-    /// The recorded state at a time, to the rounding of times. Ask for it by [`output_at`](crate::Until::output_at) or
-    /// [`output_every`](crate::Until::output_every): a finished run does not know the states between.
+    /// The recorded state at a time, to the rounding of times. Ask for it by [`output_at`](crate::Watch::output_at) or
+    /// [`output_every`](crate::Watch::output_every): a finished run does not know the states between.
     ///
     /// # Errors
     ///

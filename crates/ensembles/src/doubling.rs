@@ -289,3 +289,5 @@ pub enum StepAdviceError {
 }
 
 metriplectic_equations::debug_is_the_sentence!(StepAdviceError);
+
+metriplectic_integrators::passed_on_as_error!(DoublingError, StepAdviceError);

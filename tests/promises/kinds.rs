@@ -88,15 +88,22 @@ pub(crate) type Outcome = Result<Ran, (String, String)>;
 /// The name of the fault of a method.
 fn of_method(error: &MethodError) -> String {
     match error.downcast_ref::<NoiseError>() {
-        Some(error) => format!("NoiseError::{}", variant(&format!("{error:?}"))),
+        Some(error) => format!("NoiseError::{}", of_noise(error)),
         None if error.downcast_ref::<NotDamped>().is_some() => "NotDamped".to_owned(),
         None => "MethodError".to_owned(),
     }
 }
 
-/// The name of a variant from its `Debug` form.
-fn variant(debug: &str) -> &str {
-    debug.split([' ', '{', '(']).next().unwrap_or_default()
+/// The name of a fault of noise.
+const fn of_noise(error: &NoiseError) -> &'static str {
+    match error {
+        NoiseError::NeedsFixedSteps => "NeedsFixedSteps",
+        NoiseError::NoiseWithRadau => "NoiseWithRadau",
+        NoiseError::OrderTooLow { .. } => "OrderTooLow",
+        NoiseError::StabilityUnresolved { .. } => "StabilityUnresolved",
+        NoiseError::FrictionUnresolved { .. } => "FrictionUnresolved",
+        _ => "?",
+    }
 }
 
 fn outcome<M: StateSpace>(
@@ -136,7 +143,7 @@ fn name_of<M: StateSpace>(error: &RunError<M>) -> String {
         },
         RunError::Model(_) => "ModelError".to_owned(),
         RunError::Flow(error) => match error.downcast_ref::<NoiseError>() {
-            Some(error) => format!("NoiseError::{}", variant(&format!("{error:?}"))),
+            Some(error) => format!("NoiseError::{}", of_noise(error)),
             None => match error.downcast_ref::<LatticeError>() {
                 Some(_) => "LatticeError".to_owned(),
                 None => "FlowError".to_owned(),

@@ -17,6 +17,7 @@ const LAYOUT: &[(&str, &str)] = &[
     ("explicit/tableau.rs", "STAGES"),
     ("midpoint/predictor.rs", "DIFFERENCES"),
     ("noise/equations.rs", "NO_CLOCK"),
+    ("noise/levy.rs", "DEPTH"),
     ("noise/numbers.rs", "UNIT"),
     ("noise/sampler.rs", "MOST"),
     ("numbers/referred_rise.rs", "VECTORS"),

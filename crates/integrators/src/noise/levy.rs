@@ -82,12 +82,14 @@ mod tests {
             let at = |counter: Counter, step: u64, theta: f64| {
                 levy(&counter, (step, 3), theta).unwrap() * theta.sqrt()
             };
-            for theta in [0.11, 0.25, 0.7, 0.5] {
+            // The last intervals of the two are 2⁻⁵³ and 2⁻⁵² of a step, in which a path moves by their roots; no halves are left of 0.25.
+            let allowed = 8.0 * 2.0_f64.powi(-26);
+            for (theta, allowed) in [(0.11, allowed), (0.25, 1e-14), (0.7, allowed), (0.5, 1e-14)] {
                 let first = at(fine, 14, theta) * 0.5_f64.sqrt();
                 let off = (at(coarse, 7, 0.5 * theta) - first).abs();
-                assert!(off < 1e-14, "{theta} of {}: {off:e}", fine.name());
+                assert!(off < allowed, "{theta} of {}: {off:e}", fine.name());
                 let second = (fine.number(14, 3) + at(fine, 15, theta)) * 0.5_f64.sqrt();
-                assert!((at(coarse, 7, 0.5 + 0.5 * theta) - second).abs() < 1e-14);
+                assert!((at(coarse, 7, 0.5 + 0.5 * theta) - second).abs() < allowed);
             }
             assert_ne!(coarse.name(), fine.name());
         }

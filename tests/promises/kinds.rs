@@ -100,7 +100,7 @@ const fn of_noise(error: &NoiseError) -> &'static str {
         NoiseError::NeedsFixedSteps => "NeedsFixedSteps",
         NoiseError::NoiseWithRadau => "NoiseWithRadau",
         NoiseError::OrderTooLow { .. } => "OrderTooLow",
-        NoiseError::StabilityUnresolved { .. } => "StabilityUnresolved",
+        NoiseError::StabilityUnresolved => "StabilityUnresolved",
         NoiseError::FrictionUnresolved { .. } => "FrictionUnresolved",
         _ => "?",
     }

@@ -73,8 +73,8 @@ pub use numbers::FromEquations;
 pub use open::{NotDamped, OpenBuilder, OpenEquations, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
-    UnsureEvent,
+    Certificate, EventCount, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime,
+    StageBalance, UnsureEvent,
 };
 pub use run::checkpoint::{Checkpoint, ResumeError};
 pub use run::event::Event;

@@ -116,6 +116,9 @@ pub struct Certificate {
     /// The balance of each event at which the state has [jumped](crate::Watched::jump).
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub jumps: Vec<JumpBalance>,
+    /// How often each event has happened, in the order in which they were asked for.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub event_counts: Vec<EventCount>,
     /// The events whose functions vary in a step faster than looks at them tell: some may not have been found.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub unsure_events: Vec<UnsureEvent>,
@@ -203,6 +206,17 @@ pub struct RestInTime {
     pub time: f64,
     /// The longest of them.
     pub longest: f64,
+}
+
+/// How often an event has happened in a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct EventCount {
+    /// The name of the event.
+    pub name: String,
+    /// The number of times.
+    pub count: usize,
 }
 
 /// An event whose function was looked at in steps where its values did not agree with each other.
@@ -322,6 +336,7 @@ impl Certificate {
             exchange: flow.ledger(x0),
             exchange_errors: None,
             jumps: Vec::new(),
+            event_counts: Vec::new(),
             unsure_events: Vec::new(),
             events_at_start: Vec::new(),
             exchanged_in_jumps: Exchanged::NOTHING,

@@ -117,10 +117,11 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         };
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let mut watching = Watching::new(watch, &progress, &state, &[])?;
+        let mut watching = Watching::new(watch, &progress, &state, (&[], &[]))?;
         if let Some(watching) = &mut watching {
             let names = watching.events.begin(&state).into_iter();
             certificate.events_at_start = names.map(|name| name.to_string()).collect();
+            certificate.event_counts = watching.events.counts();
         }
         let before = StepBefore {
             state: state.clone(),

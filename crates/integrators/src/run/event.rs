@@ -12,6 +12,7 @@ use std::any::{Any, type_name};
 use std::fmt;
 use std::sync::Arc;
 
+use crate::run::certificate::EventCount;
 use crate::run::departure::{self, Departure, Seen, Sides};
 use crate::run::jump::{Jump, JumpOn, JumpRequest};
 use crate::run::looks::{self, Looked};
@@ -101,7 +102,8 @@ pub(crate) struct Request {
     name: Arc<str>,
     pub(crate) rising: bool,
     pub(crate) falling: bool,
-    pub(crate) stops: bool,
+    /// At every how manieth time the run stops, if it does.
+    pub(crate) stops_after: Option<usize>,
     pub(crate) jump: Option<JumpRequest>,
     /// The longest time between two looks, if one was asked for.
     pub(crate) resolution: Option<f64>,
@@ -126,7 +128,7 @@ impl Request {
             name: name.into(),
             rising: true,
             falling: true,
-            stops: false,
+            stops_after: None,
             jump: None,
             resolution: None,
             bridged: false,
@@ -178,12 +180,12 @@ impl Request {
 
 impl fmt::Debug for Request {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, rising, falling, stops, .. } = self;
+        let Self { name, rising, falling, stops_after, .. } = self;
         f.debug_struct("Request")
             .field("name", name)
             .field("rising", rising)
             .field("falling", falling)
-            .field("stops", stops)
+            .field("stops_after", stops_after)
             .finish_non_exhaustive()
     }
 }
@@ -191,7 +193,7 @@ impl fmt::Debug for Request {
 /// Compares the functions by identity, and their options.
 impl PartialEq for Request {
     fn eq(&self, other: &Self) -> bool {
-        let options = |r: &Self| (r.rising, r.falling, r.stops, r.resolution, r.bridged);
+        let options = |r: &Self| (r.rising, r.falling, r.stops_after, r.resolution, r.bridged);
         let jumps = match (&self.jump, &other.jump) {
             (Some(a), Some(b)) => a.is(b),
             (a, b) => a.is_none() && b.is_none(),
@@ -213,8 +215,10 @@ struct Watched<M: StateSpace> {
     jump: Option<JumpOn<M>>,
     /// How the state leaves the event at which it has jumped, as long as the function is round-off there.
     departure: Option<Departure>,
-    /// Both before the last step.
-    before: (f64, Option<Departure>),
+    /// How often it has happened in the run.
+    count: usize,
+    /// All three before the last step.
+    before: (f64, Option<Departure>, usize),
 }
 
 /// The last number of the function of an event that has no value where a run is put down.
@@ -299,11 +303,13 @@ struct Node<M: StateSpace> {
 }
 
 impl<M: StateSpace> Events<M> {
-    /// Watches the events that were asked for, from the start of a run, or where it was put down with these last numbers.
+    /// Watches the events that were asked for, from the start of a run, or where it was put down with these last numbers and
+    /// counts.
     pub(crate) fn new(
         requests: Vec<Request>,
         state: &State<M>,
         last: &[LastNumber],
+        counts: &[EventCount],
     ) -> Result<Self, SpanError> {
         let watched = |(index, request): (usize, Request)| {
             let function = request.on::<M>(index)?;
@@ -316,8 +322,10 @@ impl<M: StateSpace> Events<M> {
                 Some(jump) => Some(jump.on(index)?),
                 None => None,
             };
-            let before = (value, departure);
-            Ok(Watched { request, function, value, jump, departure, before })
+            let counted = counts.get(index).filter(|counted| *counted.name == *request.name);
+            let count = counted.map_or(0, |counted| counted.count);
+            let before = (value, departure, count);
+            Ok(Watched { request, function, value, jump, departure, count, before })
         };
         requests.into_iter().enumerate().map(watched).collect::<Result<_, _>>().map(Self)
     }
@@ -341,9 +349,25 @@ impl<M: StateSpace> Events<M> {
         self.0.is_empty()
     }
 
+    /// Enters how often each of them has happened.
+    pub(crate) fn enter(&self, counts: &mut [EventCount]) {
+        for (counted, watched) in counts.iter_mut().zip(&self.0) {
+            counted.count = watched.count;
+        }
+    }
+
+    /// How often each of them has happened, by their names.
+    pub(crate) fn counts(&self) -> Vec<EventCount> {
+        let counted = |watched: &Watched<M>| EventCount {
+            name: watched.request.name.to_string(),
+            count: watched.count,
+        };
+        self.0.iter().map(counted).collect()
+    }
+
     /// Returns whether one of them ends the run.
     pub(crate) fn may_stop(&self) -> bool {
-        self.0.iter().any(|watched| watched.request.stops)
+        self.0.iter().any(|watched| watched.request.stops_after.is_some())
     }
 
     /// Begins a run at a state. A function that is zero there, but for the rounding of the time, has no event there. Returns the
@@ -398,16 +422,19 @@ impl<M: StateSpace> Events<M> {
         indices.sort_by_key(|&index| !self.0[index].interrupts());
         let (mut limit, mut unsure) = (1.0_f64, Vec::new());
         let (mut thetas, mut found) = (Vec::new(), Vec::new());
+        let (mut stops, mut interrupts) = (Vec::new(), Vec::new());
         for index in indices {
             let watched = &mut self.0[index];
             let Changes { changes, unsure: first } = look(watched, limit)?;
             let name = &watched.request.name;
             unsure.extend(first.map(|theta| (Arc::clone(name), theta)));
-            for Change { theta, rises, state } in changes {
+            for (before, Change { theta, rises, state }) in changes.into_iter().enumerate() {
                 let name = Arc::clone(name);
                 thetas.push((theta, index));
                 found.push(Some(Event { name, index, rises, state, jump: None }));
-                if watched.interrupts() {
+                stops.push(watched.stops_in() == Some(before + 1));
+                interrupts.push(watched.is_over_after(before + 1));
+                if watched.is_over_after(before + 1) {
                     limit = limit.min(theta);
                 }
             }
@@ -417,26 +444,32 @@ impl<M: StateSpace> Events<M> {
         let unsure = unsure.into_iter().map(|(name, theta)| (name, time(theta))).collect();
         let order = in_order(&thetas);
         let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
-        let end = events.iter().position(|event| self.0[event.index].interrupts());
-        let Some(end) = end else { return Some(Found { events, end: None, unsure }) };
+        let Some(end) = order.iter().position(|&i| interrupts[i]) else {
+            self.count(&events);
+            return Some(Found { events, end: None, unsure });
+        };
         let at = thetas[order[end]].0;
         let same_time = |i: &usize| thetas[order[*i]].0 <= at + SAME_TIME;
         let with_it = (end..order.len()).take_while(same_time);
         // A stop comes before the jumps at its time, which do not happen.
-        let stops = |event: &Event<M>| self.0[event.index].request.stops;
-        if let Some(stop) = with_it.clone().find(|i| stops(&events[*i])) {
+        if let Some(stop) = with_it.clone().find(|i| stops[order[*i]]) {
             events.truncate(stop + 1);
             let mut i = 0..;
-            events.retain(|event| {
-                i.next().is_none_or(|i| i < end)
-                    || stops(event)
-                    || !self.0[event.index].interrupts()
+            events.retain(|_| {
+                i.next().is_none_or(|i| i < end || stops[order[i]] || !interrupts[order[i]])
             });
+            self.count(&events);
             return Some(Found { events, end: Some(Interruption::Stop), unsure });
         }
         let with_it = with_it.skip(1).map(|i| (events[i].index, events[i].rises)).collect();
         events.truncate(end + 1);
+        self.count(&events);
         Some(Found { events, end: Some(Interruption::Jump { with_it }), unsure })
+    }
+
+    /// Counts the events of a step.
+    fn count(&mut self, events: &[Event<M>]) {
+        events.iter().for_each(|event| self.0[event.index].count += 1);
     }
 
     /// The jump at an event.
@@ -475,7 +508,7 @@ impl<M: StateSpace> Events<M> {
     /// Forgets a step that is taken back.
     pub(crate) fn take_back(&mut self) {
         for watched in &mut self.0 {
-            (watched.value, watched.departure) = watched.before;
+            (watched.value, watched.departure, watched.count) = watched.before;
         }
     }
 
@@ -532,9 +565,19 @@ struct Changes<M: StateSpace> {
 }
 
 impl<M: StateSpace> Watched<M> {
-    /// Whether the run stops at the event, or the state jumps there.
+    /// Whether the run may stop at the event, or the state jumps there.
     const fn interrupts(&self) -> bool {
-        self.request.stops || self.jump.is_some()
+        self.request.stops_after.is_some() || self.jump.is_some()
+    }
+
+    /// After how many more times the run stops.
+    fn stops_in(&self) -> Option<usize> {
+        self.request.stops_after.map(|n| n - self.count % n)
+    }
+
+    /// Whether so many times in a step end it.
+    fn is_over_after(&self, times: usize) -> bool {
+        times > 0 && (self.jump.is_some() || self.stops_in().is_some_and(|left| times >= left))
     }
 
     fn at(&self, state: &State<M>) -> f64 {
@@ -597,7 +640,7 @@ impl<M: StateSpace> Watched<M> {
     ) -> Option<Changes<M>> {
         let [start, end] = step.ends;
         let (before, after) = (self.value, self.at(end));
-        self.before = (before, self.departure);
+        self.before = (before, self.departure, self.count);
         let node = |at, value, state: Option<&State<M>>| Node {
             sample: Sample { at, value },
             state: state.cloned(),
@@ -669,7 +712,7 @@ impl<M: StateSpace> Watched<M> {
             leave_out_touches(&mut nodes, sign, is_last);
             for pair in nodes.windows(2) {
                 let [a, b] = [pair[0].sample, pair[1].sample];
-                if a.at > limit + SAME_TIME || self.interrupts() && !changes.is_empty() {
+                if a.at > limit + SAME_TIME || self.is_over_after(changes.len()) {
                     break;
                 }
                 if self.changes(a.value, b.value) {
@@ -694,7 +737,7 @@ impl<M: StateSpace> Watched<M> {
             // A change across a step that ends at a NaN is found in the next one.
             self.value = nodes.last().map_or(f64::NAN, |node| node.sample.value);
             let over = nodes.last().is_some_and(|node| node.sample.at > limit + SAME_TIME);
-            if over || self.interrupts() && !changes.is_empty() {
+            if over || self.is_over_after(changes.len()) {
                 if !is_last && !after.is_nan() {
                     self.value = after;
                 }

@@ -164,8 +164,12 @@ impl<F: Flow + ?Sized> Course<'_, F> {
     pub(super) fn watch(&mut self, schedule: Schedule) -> Result<(), SpanError> {
         self.watching = {
             let last = if self.before.h == 0.0 { self.last_numbers.as_slice() } else { &[] };
-            Watching::new(schedule.watch, &self.progress, &self.state, last)?
+            let counts = self.certificate.event_counts.as_slice();
+            Watching::new(schedule.watch, &self.progress, &self.state, (last, counts))?
         };
+        if let Some(watching) = &self.watching {
+            self.certificate.event_counts = watching.events.counts();
+        }
         Ok(())
     }
 
@@ -281,6 +285,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         if let Err(StepError::Jump { .. }) = looked {
             method.restart();
             self.take_back();
+        }
+        if let Some(watching) = &self.watching {
+            watching.events.enter(&mut self.certificate.event_counts);
         }
         looked
     }

@@ -29,6 +29,9 @@ impl Requests {
         let unseen =
             |resolution: f64| !(resolution > rounding(start, seen) && resolution.is_finite());
         for (index, event) in self.events.iter().enumerate() {
+            if event.stops_after == Some(0) {
+                return Err(SpanError::StopAfterNone { index });
+            }
             if let Some(resolution) = event.resolution.filter(|resolution| unseen(*resolution)) {
                 return Err(SpanError::EventResolution { index, resolution });
             }

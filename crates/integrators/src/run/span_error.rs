@@ -177,6 +177,12 @@ pub enum SpanError {
         /// The resolution.
         resolution: f64,
     },
+    /// A run is to stop after an event has happened no times.
+    #[error("event {index} is to stop the run after 0 times; it must be at least one")]
+    StopAfterNone {
+        /// Which event, in the order in which they were asked for, counted from 0.
+        index: usize,
+    },
     /// The function of an event has points of another type than the run.
     #[error(
         "event {index} is a function of {}, and the points of the run are {}; say this type in the closure",

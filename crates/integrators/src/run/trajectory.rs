@@ -56,6 +56,16 @@ impl<M: StateSpace> Trajectory<M> {
         &self.events
     }
 
+    /// How often the [events](Self::events) of this name have happened, in the whole of a run that was resumed; `None` if none was
+    /// asked for.
+    pub fn count(&self, event: &str) -> Option<usize> {
+        let counts = self.certificate.event_counts.iter();
+        counts
+            .filter(|counted| counted.name == event)
+            .map(|counted| counted.count)
+            .reduce(|a, b| a + b)
+    }
+
     /// The state at the end of the run.
     pub fn last(&self) -> &State<M> {
         &self.states[self.states.len() - 1]

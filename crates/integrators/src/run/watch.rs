@@ -355,7 +355,38 @@ impl Watched {
     /// # }
     /// ```
     pub fn stop(self) -> Self {
-        self.with(|request| request.stops = true)
+        self.stop_after(1)
+    }
+
+    /// Ends the run at the `n`-th time that the event happens, as [`stop`](Self::stop) does at the first. The certificate
+    /// [counts](crate::Certificate::event_counts) each event.
+    ///
+    /// A run that is [resumed](crate::Method::resume) from a checkpoint goes on counting, if the event is the one of its number and
+    /// its name: it ends where the count is a multiple of `n`. At an event with a [jump](Self::jump) the state jumps the first
+    /// `n − 1` times, and the run ends in the state before the `n`-th jump.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Ending, Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::until(100.0).event("turn", |p: &Vector3<f64>| p.y).rising().stop_after(3);
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// assert_eq!(run.ending(), Ending::Event { index: 0 });
+    /// assert_eq!(run.count("turn"), Some(3));
+    /// assert_eq!(run.last(), &run.events()[2].state);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// A run that is to stop after 0 times is [refused](crate::SpanError::StopAfterNone).
+    pub fn stop_after(self, n: usize) -> Self {
+        self.with(|request| request.stops_after = Some(n))
     }
 }
 
@@ -497,6 +528,11 @@ impl Jumping {
     /// Looks at the function at least once in each interval `dt` of the time, see [`Watched::resolution`].
     pub fn resolution(self, dt: f64) -> Self {
         Self(self.0.resolution(dt))
+    }
+
+    /// Ends the run before the `n`-th jump, see [`Watched::stop_after`].
+    pub fn stop_after(self, n: usize) -> Self {
+        Self(self.0.stop_after(n))
     }
 
     /// The function has to rise through zero, see [`Watched::rising`].

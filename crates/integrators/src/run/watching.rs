@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use crate::run::certificate::EventCount;
 use crate::run::event::{Event, Events, LastNumber};
 use crate::run::progress::Progress;
 use crate::run::requests::{Outputs, Requests};
@@ -40,13 +41,13 @@ impl<M: StateSpace> Watching<M> {
         requests: Requests,
         progress: &Progress<V>,
         state: &State<M>,
-        last: &[LastNumber],
+        (last, counts): (&[LastNumber], &[EventCount]),
     ) -> Result<Option<Box<Self>>, SpanError> {
         let start = progress.start;
         requests.check([start, progress.end()], progress.next_end(state.time))?;
         let Requests { times, interval, events } = requests;
         let outputs = Outputs::after(state.time, start, times, interval).until(progress.end());
-        let events = Events::new(events, state, last)?;
+        let events = Events::new(events, state, last, counts)?;
         if outputs.is_empty() && events.is_empty() {
             return Ok(None);
         }

@@ -5,8 +5,8 @@ use std::fmt;
 use metriplectic_dynamics::SecondLaw;
 
 use super::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
-    UNRESOLVED, UnsureEvent,
+    Certificate, EventCount, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime,
+    StageBalance, UNRESOLVED, UnsureEvent,
 };
 use crate::round_off::bound::of_a_law;
 use crate::run::jump::JumpBalance;
@@ -227,8 +227,11 @@ impl Certificate {
         Ok(())
     }
 
-    /// Says which events were looked for where their function tells nothing.
+    /// Says how often events have happened, and which were looked for where their function tells nothing.
     fn looked(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for EventCount { name, count } in &self.event_counts {
+            writeln!(f, "events:      {name} {}", counted(*count, "time", "times"))?;
+        }
         for UnsureEvent { name, steps, first } in &self.unsure_events {
             let steps = counted(*steps, "step", "steps");
             writeln!(

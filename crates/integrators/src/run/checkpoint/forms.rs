@@ -6,8 +6,8 @@ use metriplectic_dynamics::invariants::Kind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::run::certificate::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
-    UnsureEvent,
+    Certificate, EventCount, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime,
+    StageBalance, UnsureEvent,
 };
 use crate::run::ending::Ending;
 use crate::run::jump::{Exchanged, JumpBalance};
@@ -70,6 +70,8 @@ struct CertificateForm {
     exchange_errors: Option<LedgerErrors>,
     #[serde(with = "exact")]
     jumps: Vec<JumpBalance>,
+    #[serde(default)]
+    event_counts: Vec<EventCount>,
     #[serde(with = "exact", default)]
     unsure_events: Vec<UnsureEvent>,
     #[serde(default)]

@@ -61,7 +61,7 @@ impl<M: StateSpace> Watched<M> {
         limit: f64,
         path: &mut dyn Path<M>,
     ) -> Option<Changes<M>> {
-        self.before = (self.value, self.departure);
+        self.before = (self.value, self.departure, self.count);
         // A path has no direction in which it leaves an event.
         self.departure = None;
         let mut changes = Vec::new();
@@ -75,7 +75,7 @@ impl<M: StateSpace> Watched<M> {
         }
         let gaps = self.gaps(ends[1].time - ends[0].time);
         for k in 1..=gaps {
-            if before.theta > limit || self.interrupts() && !changes.is_empty() {
+            if before.theta > limit || self.is_over_after(changes.len()) {
                 break;
             }
             let theta = k as f64 / gaps as f64;

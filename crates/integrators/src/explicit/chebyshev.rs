@@ -41,7 +41,7 @@ pub(super) fn stages<F: StageFlow>(
 ) -> Result<LastStep<F::Vector>, Refused> {
     let Here { velocity: start, production } = here;
     let spectrum = spectrum(flow, x, &start, memory.spectrum.take());
-    let count = spectrum.as_ref().map_or(2, |spectrum| stage_count(h * spectrum.radius));
+    let count = spectrum.as_ref().map_or(2, |spectrum| stage_count(h.abs() * spectrum.radius));
     memory.spectrum = spectrum;
     if count > MOST {
         return Err(Refused::Far);

@@ -36,8 +36,8 @@ impl Adaptive {
         (self.first, self.least) = (self.first.map(within), self.least.map(within));
     }
 
-    pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {
-        check_end(start, self.end)?;
+    pub(crate) fn check(&self, start: f64, backward: bool) -> Result<(), SpanError> {
+        check_end(start, self.end, backward)?;
         for h in [self.first, self.least, self.largest].into_iter().flatten() {
             check_step_size(h)?;
         }

@@ -185,7 +185,7 @@ impl Checkpoint {
         let StepSize::Adaptive(controller) = &mut run.progress.step_size else {
             return Err(ResumeError::FixedSteps);
         };
-        check_end(run.time.0, end)?;
+        check_end(run.time.0, end, run.progress.backward)?;
         controller.pace.end = end;
         Ok(run.go_on())
     }

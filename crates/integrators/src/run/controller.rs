@@ -275,7 +275,7 @@ impl Pace {
     /// the law of motion is found to within it. A motion that ends shrinks its steps again.
     pub(crate) fn may_jump(&self, rule: &Rule, t: f64, h: f64) -> bool {
         let instant = INSTANT * self.roundings(rule);
-        h <= instant && self.jumped.is_none_or(|before| t - before > APART * instant)
+        h <= instant && self.jumped.is_none_or(|before| (t - before).abs() > APART * instant)
     }
 
     /// The law of motion has jumped in a step of size `h` from time `t`.
@@ -286,16 +286,16 @@ impl Pace {
 
     /// The longest step of a system that takes the time, as long as nothing changes its motion: a hundredth of the run.
     pub(crate) fn longest_at_rest(&self, rule: &Rule) -> f64 {
-        AT_REST * (self.end - rule.start)
+        AT_REST * (self.end - rule.start).abs()
     }
 
     /// A step size within the bounds.
     pub(crate) fn within(&self, rule: &Rule, h: f64) -> f64 {
         let least = self.least(rule);
-        h.clamp(least, self.largest.unwrap_or(self.end - rule.start).max(least))
+        h.clamp(least, self.largest.unwrap_or((self.end - rule.start).abs()).max(least))
     }
 
-    /// The size of the step to try from time `t` on the way to `end`, so that `t + h` has no round-off, and whether it
+    /// The size of the step to try from time `t` on the way to a later `end`, so that `t + h` has no round-off, and whether it
     /// is the last one.
     pub(crate) fn attempt(&self, t: f64, end: f64) -> (f64, bool) {
         let (h, left) = (self.next, end - t);
@@ -405,7 +405,7 @@ impl<V: Vector> Controller<V> {
         x: &Element<F>,
         scales: &Scales<V>,
     ) -> f64 {
-        let (span, allowed) = (self.pace.end - rule.start, self.allowed(rule, scales, 0.0));
+        let (span, allowed) = ((self.pace.end - rule.start).abs(), self.allowed(rule, scales, 0.0));
         let (in_time, longest) = (flow.depends_on_time(), self.pace.longest_at_rest(rule));
         let h = flow.rates(x, &scales.sizes.zero()).and_then(|v| {
             let own_time = scales.speed(&v).recip().min(span);

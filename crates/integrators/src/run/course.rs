@@ -1,5 +1,7 @@
 //! A run without its loop: all of it but the method, its memory, and what each step needs of the system.
 
+use metriplectic_dynamics::SecondLaw;
+
 use crate::run::certificate::{Certificate, InvariantBalance};
 use crate::run::controller::{Rule, StepSize};
 use crate::run::ending::Ending;
@@ -8,14 +10,15 @@ use crate::run::event::LastNumber;
 use crate::run::judged::Judged;
 use crate::run::least_sizes::least_sizes;
 use crate::run::progress::Progress;
-use crate::run::schedule::{Schedule, Size};
+use crate::run::schedule::{Schedule, Size, direction};
 use crate::run::sequence::Frozen;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::scales::larger;
 use crate::step::{
-    Element, Flow, Laws, NoiseSummary, Promises, Scales, StepError, StepStart, Stepper, Vector as _,
+    Element, Flow, Laws, LedgerSummary, NoiseSummary, Promises, Scales, StepError, StepStart,
+    Stepper, Vector as _,
 };
 
 /// The statements of a method about a run before its first step.
@@ -74,18 +77,31 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             return Err(SpanError::NoRestInTime.into());
         }
         let x0 = flow.begin(x0, schedule.start)?;
+        if schedule.backward {
+            check_backward(flow, &x0, noise.is_some())?;
+        }
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let values = flow.laws(&x0);
         let mut certificate =
             Certificate { noise, ..Certificate::start(flow, &x0, &values, promises) };
         let mut scales = Scales::at(flow, &x0, schedule.span());
-        let Schedule { size, start, count, every, most, rest, watch, mut corners, frozen } =
-            schedule;
+        let Schedule {
+            size,
+            start,
+            backward,
+            count,
+            every,
+            most,
+            rest,
+            watch,
+            mut corners,
+            frozen,
+        } = schedule;
         frozen.begin();
         corners.start = start;
         let step_size = match size {
-            Size::Fixed(h) => StepSize::Fixed(h),
+            Size::Fixed(h) => StepSize::Fixed(direction(backward) * h),
             Size::Tolerance(adaptive) => {
                 StepSize::Adaptive(adaptive.controller(&rule, flow, &x0, &scales)?)
             }
@@ -105,6 +121,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         let progress = Progress {
             step_size,
             start,
+            backward,
             count,
             every,
             most,
@@ -233,6 +250,24 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         } else {
             Ok(())
         }
+    }
+}
+
+/// Accepts a flow that has a run back in time: `x' = Π d(−H)`, by steps of a negative size.
+fn check_backward<F: Flow + ?Sized>(
+    flow: &F,
+    x0: &Element<F>,
+    is_noisy: bool,
+) -> Result<(), SpanError> {
+    let exchanges = |ledger: LedgerSummary| !(ledger.work.is_empty() && ledger.heat.is_empty());
+    if is_noisy {
+        Err(SpanError::BackwardNoise)
+    } else if flow.ledger(x0).is_some_and(exchanges) {
+        Err(SpanError::BackwardExchange)
+    } else if flow.entropy_law() != SecondLaw::NoEntropy {
+        Err(SpanError::BackwardEntropy)
+    } else {
+        Ok(())
     }
 }
 

@@ -618,10 +618,11 @@ impl<M: StateSpace> Watched<M> {
 
     /// The sign that the function has soon after the end of a step; 0 if it stays zero.
     fn later_sign(&self, step: &mut InStep<'_, M>) -> f64 {
-        let time = step.ends[1].time;
+        let (time, direction) = (step.ends[1].time, step.h.signum());
         let mut later = rounding(time, step.h);
-        while later < step.h {
-            let value = (self.function.0)(time + later, &(step.ahead)(later));
+        while later < step.h.abs() {
+            let ahead = direction * later;
+            let value = (self.function.0)(time + ahead, &(step.ahead)(ahead));
             if value != 0.0 && !value.is_nan() {
                 return value.signum();
             }
@@ -662,7 +663,8 @@ impl<M: StateSpace> Watched<M> {
             }
         }
         let of_time = self.is_of_time(step);
-        let looks = Looks::new(self.request.resolution, end.time - start.time, of_time, step.moves);
+        let looks =
+            Looks::new(self.request.resolution, (end.time - start.time).abs(), of_time, step.moves);
         for piece in 0..looks.pieces {
             let mut samples: Vec<Sample> = nodes.iter().map(|node| node.sample).collect();
             let mut value = |theta: f64, output: &mut Output<'_, M>| {

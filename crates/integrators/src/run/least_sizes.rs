@@ -56,7 +56,7 @@ pub(super) fn least_sizes<F: Flow + ?Sized>(
         largest = joined;
     }
     // Work and heat have the size of the energy to which the rates lead.
-    let reached = Scales { sizes: largest.map(|rate| span * rate), terms: zero };
+    let reached = Scales { sizes: largest.map(|rate| span.abs() * rate), terms: zero };
     flow.with_ledger_sizes(x, reached).sizes.map(|size| LEAST * size)
 }
 

@@ -182,7 +182,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
     fn at(&mut self, time: f64, method: &mut dyn AnyStepper<F>) -> Option<State<F::Space>> {
         let [start, end] = [self.before.state.time, self.state.time];
         let allowed = rounding(self.progress.start, end);
-        let inside = time >= start - allowed && time <= end + allowed;
+        let inside = time >= start.min(end) - allowed && time <= start.max(end) + allowed;
         if inside { self.inside(self.fraction(time), method) } else { None }
             .map(|state| State { time, ..state })
     }
@@ -219,7 +219,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         let times = [before.state.time, state.time];
         let at = |point: Element<F>| {
             let Laws { energy, entropy, .. } = flow.laws(&point);
-            let time = (times[0] + theta * (times[1] - times[0])).min(times[1]);
+            let time = along(times, theta);
             State { step: before.state.step, time, point, energy, entropy }
         };
         let is_between = |inside: &State<F::Space>| {
@@ -321,8 +321,10 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         if !watching.outputs.is_empty() {
             let last = stopped_at.as_ref().unwrap_or(&self.state);
             let mut before = self.before.state.clone();
+            let along_run = |time: f64| self.progress.direction() * time;
             while let Some(time) = watching.outputs.next(last.time) {
-                let state = self.output(time.min(last.time), [&before, last], method)?;
+                let time = if along_run(time - last.time) > 0.0 { last.time } else { time };
+                let state = self.output(time, [&before, last], method)?;
                 before.clone_from(&state);
                 watching.queue.push_back(state);
             }
@@ -330,7 +332,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         if self.progress.ending.is_some() {
             let last = stopped_at.unwrap_or_else(|| self.state.clone());
             if watching.replaces_steps() || self.ending().is_some_and(Ending::is_event) {
-                while watching.queue.back().is_some_and(|state| state.time >= last.time) {
+                let direction = self.progress.direction();
+                let is_over = |state: &State<F::Space>| direction * (state.time - last.time) >= 0.0;
+                while watching.queue.back().is_some_and(is_over) {
                     watching.queue.pop_back();
                 }
                 watching.queue.push_back(last);
@@ -383,7 +387,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             return None;
         }
         let point = method.on_path(&self.start_of_last(), [*h, theta])?;
-        let time = (state.time + theta * (self.state.time - state.time)).min(self.state.time);
+        let time = along([state.time, self.state.time], theta);
         let point = self.flow.clocked(&point, time).unwrap_or(point);
         let Laws { energy, entropy, .. } = self.flow.laws(&point);
         let known = State { step: state.step, time, point, energy, entropy };
@@ -426,4 +430,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         let nearer = if time - before.time < last.time - time { before } else { last };
         Some(State { time, step: state.step, ..nearer.clone() })
     }
+}
+
+/// The time at a fraction of a step, not beyond its end.
+fn along([start, end]: [f64; 2], theta: f64) -> f64 {
+    (start + theta * (end - start)).clamp(start.min(end), start.max(end))
 }

@@ -68,8 +68,10 @@ pub(crate) fn paired(
     (ending, event): End<'_>,
 ) -> Result<Vec<usize>, Unpaired> {
     let first = recorded.first().copied().unwrap_or(f64::NAN);
+    // The times of a run back in time fall.
+    let direction = if recorded.last().is_some_and(|last| *last < first) { -1.0 } else { 1.0 };
     let find = |(index, &time): (usize, &f64)| {
-        let next = recorded.partition_point(|t| *t < time);
+        let next = recorded.partition_point(|t| direction * t < direction * time);
         let off = |k: usize| recorded.get(k).map_or(f64::INFINITY, |t| (t - time).abs());
         let mut nearest = match next.checked_sub(1) {
             Some(before) if off(before) < off(next) => before,
@@ -81,7 +83,9 @@ pub(crate) fn paired(
         if off(nearest) <= rounding(first, time) {
             return Ok(nearest);
         }
-        let Some(&reached) = recorded.last().filter(|reached| time > **reached) else {
+        let Some(&reached) =
+            recorded.last().filter(|reached| direction * time > direction * **reached)
+        else {
             return Err(Unpaired::NotRecorded { index, time });
         };
         if ending.is_rest() {

@@ -4,6 +4,7 @@ use crate::run::controller::{Pace, StepSize};
 use crate::run::corners::Corners;
 use crate::run::ending::Ending;
 use crate::run::judged::Judged;
+use crate::run::schedule::direction;
 use crate::step::{Scales, Vector};
 
 #[cfg(feature = "serde")]
@@ -18,6 +19,9 @@ pub(crate) struct Progress<V> {
     /// The time at which the run started.
     #[cfg_attr(feature = "serde", serde(with = "exact"))]
     pub(crate) start: f64,
+    /// Whether it goes back in time; steps of one size are then negative.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) backward: bool,
     pub(crate) count: Option<usize>,
     pub(crate) every: usize,
     /// The most states to record.
@@ -48,7 +52,7 @@ impl<V> Progress<V> {
         &self,
         convert: impl Fn(&'static str, &V) -> Result<W, E>,
     ) -> Result<Progress<W>, E> {
-        let Self { start, count, every, most, rest, ending, .. } = *self;
+        let Self { start, backward, count, every, most, rest, ending, .. } = *self;
         let step_size = self.step_size.convert(&convert)?;
         let scales = Scales {
             sizes: convert("sizes of the entries", &self.scales.sizes)?,
@@ -63,6 +67,7 @@ impl<V> Progress<V> {
         Ok(Progress {
             step_size,
             start,
+            backward,
             count,
             every,
             most,
@@ -82,6 +87,11 @@ impl<V> Progress<V> {
         }
     }
 
+    /// The sign of the time of the run, and of its steps.
+    pub(crate) const fn direction(&self) -> f64 {
+        direction(self.backward)
+    }
+
     /// When the run ends; in a run without an end, when the next step from `time` does.
     pub(crate) fn next_end(&self, time: f64) -> f64 {
         match &self.step_size {
@@ -94,7 +104,8 @@ impl<V> Progress<V> {
     pub(crate) fn end(&self) -> f64 {
         match &self.step_size {
             StepSize::Fixed(h) => {
-                self.count.map_or(f64::INFINITY, |count| self.start + count as f64 * h)
+                let never = h.signum() * f64::INFINITY;
+                self.count.map_or(never, |count| self.start + count as f64 * h)
             }
             StepSize::Adaptive(controller) => controller.pace.end,
         }

@@ -114,7 +114,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             return false;
         };
         states.extend(watching.queue().drain(..));
-        if failed && states.last().is_none_or(|last| last.time < self.state.time) {
+        let left =
+            |last: &State<F::Space>| self.progress.direction() * (self.state.time - last.time);
+        if failed && states.last().is_none_or(|last| left(last) > 0.0) {
             states.push(self.state.clone());
         }
         true

@@ -1,6 +1,7 @@
 //! Requests for outputs and events, and the outputs that are still to come.
 
 use crate::run::event::Request;
+use crate::run::progress::Progress;
 use crate::run::rounding::rounding;
 use crate::run::span_error::SpanError;
 
@@ -20,15 +21,26 @@ impl Requests {
     }
 
     /// Accepts outputs of a run from `start` to `end` that have different times up to `seen`.
-    pub(crate) fn check(&self, [start, end]: [f64; 2], seen: f64) -> Result<(), SpanError> {
-        let last = end + rounding(start, end);
-        let outside = |time: &&f64| !(**time >= start && **time <= last && time.is_finite());
+    pub(crate) fn check(
+        &self,
+        [start, end]: [f64; 2],
+        seen: f64,
+        direction: f64,
+    ) -> Result<(), SpanError> {
+        let [first, last] = [direction * start, direction * end + rounding(start, end)];
+        let outside = |time: &&f64| {
+            let along = direction * **time;
+            !(along >= first && along <= last && time.is_finite())
+        };
         if let Some(&time) = self.times.iter().flatten().find(outside) {
             return Err(SpanError::Output { time, start, end });
         }
         let unseen =
             |resolution: f64| !(resolution > rounding(start, seen) && resolution.is_finite());
         for (index, event) in self.events.iter().enumerate() {
+            if direction < 0.0 && event.jump.is_some() {
+                return Err(SpanError::BackwardJump);
+            }
             if event.stops_after == Some(0) {
                 return Err(SpanError::StopAfterNone { index });
             }
@@ -52,6 +64,8 @@ impl Requests {
 /// The outputs of a run that are still to come.
 #[derive(Clone, Debug)]
 pub(crate) struct Outputs {
+    /// The sign of the time of the run. The times below are along the run: they rise.
+    direction: f64,
     start: f64,
     times: Option<Vec<f64>>,
     interval: Option<f64>,
@@ -71,7 +85,7 @@ impl Outputs {
         interval: Option<f64>,
     ) -> Self {
         let end = f64::INFINITY;
-        let mut outputs = Self { start, times, interval, end, index: 0, count: 0 };
+        let mut outputs = Self { direction: 1.0, start, times, interval, end, index: 0, count: 0 };
         let done = time + rounding(start, time);
         outputs.index = outputs.listed().partition_point(|t| *t <= done);
         if let Some(interval) = interval {
@@ -97,6 +111,22 @@ impl Outputs {
         self
     }
 
+    /// The outputs after `time` in a run with this progress.
+    pub(crate) fn of<V>(
+        progress: &Progress<V>,
+        time: f64,
+        times: Option<Vec<f64>>,
+        interval: Option<f64>,
+    ) -> Self {
+        let (direction, backward) = (progress.direction(), progress.backward);
+        let along = |times: Vec<f64>| {
+            if backward { times.iter().rev().map(|t| -t).collect() } else { times }
+        };
+        let start = direction * progress.start;
+        let outputs = Self::after(direction * time, start, times.map(along), interval);
+        Self { direction, ..outputs.until(direction * progress.end()) }
+    }
+
     pub(crate) const fn is_empty(&self) -> bool {
         self.times.is_none() && self.interval.is_none()
     }
@@ -119,7 +149,7 @@ impl Outputs {
 
     /// The next output up to `time`, or so near to it that it is the same time.
     pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
-        let last = time + rounding(self.start, time);
+        let last = self.direction * time + rounding(self.start, time);
         let listed = self.listed().get(self.index).copied().filter(|t| *t <= last);
         let counted = self.in_interval().filter(|t| *t <= last);
         let next = match (listed, counted) {
@@ -130,7 +160,7 @@ impl Outputs {
         };
         self.index += usize::from(listed.is_some_and(|t| t <= next));
         self.count += usize::from(counted.is_some_and(|t| t <= next));
-        Some(next)
+        Some(self.direction * next)
     }
 }
 

@@ -22,6 +22,8 @@ pub struct Schedule {
     pub(crate) size: Size,
     /// The time at which the run starts.
     pub(crate) start: f64,
+    /// Whether it goes back in time.
+    pub(crate) backward: bool,
     pub(crate) count: Option<usize>,
     pub(crate) every: usize,
     /// The most states to record.
@@ -35,6 +37,11 @@ pub struct Schedule {
     pub(crate) frozen: Frozen,
 }
 
+/// The sign of the time of a run, and of its steps.
+pub(crate) const fn direction(backward: bool) -> f64 {
+    if backward { -1.0 } else { 1.0 }
+}
+
 /// How large the steps of a course are.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Size {
@@ -46,7 +53,18 @@ impl From<f64> for Schedule {
     fn from(h: f64) -> Self {
         let (start, every, most, rest) = (0.0, 1, None, None);
         let (watch, corners, frozen) = (Requests::default(), Corners::default(), Frozen::No);
-        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch, corners, frozen }
+        Self {
+            size: Size::Fixed(h),
+            start,
+            backward: false,
+            count: None,
+            every,
+            most,
+            rest,
+            watch,
+            corners,
+            frozen,
+        }
     }
 }
 
@@ -89,7 +107,7 @@ impl Schedule {
     /// How long the run may last, if the sizes of the entries matter to it: to its errors, or to its rest.
     pub(crate) fn span(&self) -> Option<f64> {
         match &self.size {
-            Size::Tolerance(adaptive) => Some(adaptive.end() - self.start),
+            Size::Tolerance(adaptive) => Some((adaptive.end() - self.start).abs()),
             Size::Fixed(h) if self.rest.is_some() => {
                 Some(self.count.map_or(*h, |count| count as f64 * h))
             }
@@ -100,7 +118,10 @@ impl Schedule {
     /// When the run ends; infinite if it does not.
     pub(crate) fn end(&self) -> f64 {
         match &self.size {
-            Size::Fixed(h) => self.count.map_or(f64::INFINITY, |n| self.start + n as f64 * h),
+            Size::Fixed(h) => {
+                let h = direction(self.backward) * h;
+                self.count.map_or(h.signum() * f64::INFINITY, |n| self.start + n as f64 * h)
+            }
             Size::Tolerance(adaptive) => adaptive.end(),
         }
     }
@@ -118,10 +139,10 @@ impl Schedule {
             Size::Fixed(h) => {
                 check_step_size(*h)?;
                 if let Some(count) = self.count.filter(|count| *count > 0) {
-                    check_steps(self.start, *h, count)?;
+                    check_steps(self.start, direction(self.backward) * h, count)?;
                 }
             }
-            Size::Tolerance(adaptive) => adaptive.check(self.start)?,
+            Size::Tolerance(adaptive) => adaptive.check(self.start, self.backward)?,
         }
         if self.count == Some(0) {
             return Err(SpanError::NoSteps);
@@ -131,6 +152,9 @@ impl Schedule {
         }
         if self.watch.has_outputs() && (self.every != 1 || self.most.is_some()) {
             return Err(SpanError::TwoRecords);
+        }
+        if self.backward && !self.corners.is_empty() {
+            return Err(SpanError::BackwardCorners);
         }
         self.corners.check(self.end())?;
         match self.rest {

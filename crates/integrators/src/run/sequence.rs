@@ -99,11 +99,12 @@ impl Frozen {
     }
 
     /// The time at which the step after so many steps ends that begins at a time. A run that is ahead of the list, because an event
-    /// came earlier or a step was taken in parts, goes on to the next time of it.
-    pub(super) fn end(&self, steps: usize, begin: f64) -> Option<f64> {
+    /// came earlier or a step was taken in parts, goes on to the next time of it. The times rise, or fall where their direction is −1.
+    pub(super) fn end(&self, steps: usize, begin: f64, direction: f64) -> Option<f64> {
         let Self::Taking(ends) = self else { return None };
-        let own = ends.get(steps).filter(|end| **end > begin);
-        own.or_else(|| ends.get(ends.partition_point(|end| *end <= begin))).copied()
+        let is_over = |end: &f64| direction * (end - begin) <= 0.0;
+        let own = ends.get(steps).filter(|end| !is_over(end));
+        own.or_else(|| ends.get(ends.partition_point(is_over))).copied()
     }
 }
 
@@ -118,14 +119,14 @@ mod tests {
         [1.0, 2.0, 4.0].into_iter().for_each(|end| noting.note(end));
         let taking = Frozen::taking(&sequence);
         // An event at 0.5 has cut the first step: the second one goes to 2 all the same.
-        assert_eq!([0, 1, 2].map(|step| taking.end(step, 0.5)), [1.0, 2.0, 4.0].map(Some));
+        assert_eq!([0, 1, 2].map(|step| taking.end(step, 0.5, 1.0)), [1.0, 2.0, 4.0].map(Some));
         // Ahead of the list, and behind it.
         assert_eq!(
-            [taking.end(1, 2.5), taking.end(7, 1.0), taking.end(3, 4.0)],
+            [taking.end(1, 2.5, 1.0), taking.end(7, 1.0, 1.0), taking.end(3, 4.0, 1.0)],
             [Some(4.0), Some(2.0), None]
         );
-        assert_eq!(Frozen::No.end(0, 0.0), None);
+        assert_eq!(Frozen::No.end(0, 0.0, 1.0), None);
         noting.begin();
-        assert!(sequence.ends().is_empty() && taking.end(0, 0.0) == Some(1.0));
+        assert!(sequence.ends().is_empty() && taking.end(0, 0.0, 1.0) == Some(1.0));
     }
 }

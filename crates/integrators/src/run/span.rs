@@ -19,12 +19,13 @@ pub struct Span {
     count: usize,
     every: usize,
     rest: Option<f64>,
+    backward: bool,
 }
 
 impl Span {
     /// `count` steps of size `step`, each of them recorded.
     pub const fn steps(step: f64, count: usize) -> Self {
-        Self { start: 0.0, step, count, every: 1, rest: None }
+        Self { start: 0.0, step, count, every: 1, rest: None, backward: false }
     }
 
     /// The time at which the run starts, 0 without another one.
@@ -66,6 +67,12 @@ impl Span {
         Self { rest: Some(tolerance), ..self }
     }
 
+    /// Goes back in time: the steps end at `t₀ − h, t₀ − 2h, …`, see [`Watch::backward`](crate::Watch::backward).
+    #[must_use]
+    pub const fn backward(self) -> Self {
+        Self { backward: true, ..self }
+    }
+
     /// The step size.
     pub const fn step_size(&self) -> f64 {
         self.step
@@ -83,10 +90,10 @@ impl Span {
 }
 
 impl From<Span> for Schedule {
-    fn from(Span { start, step, count, every, rest }: Span) -> Self {
+    fn from(Span { start, step, count, every, rest, backward }: Span) -> Self {
         let (size, watch) = (Size::Fixed(step), Requests::default());
         let (count, corners, frozen) = (Some(count), Corners::default(), Frozen::No);
-        Self { size, start, count, every, most: None, rest, watch, corners, frozen }
+        Self { size, start, backward, count, every, most: None, rest, watch, corners, frozen }
     }
 }
 

@@ -1,14 +1,11 @@
 //! Spans that cannot be run.
 
+use crate::run::schedule::direction;
 use crate::step::type_names::short;
 
 /// Advice on a run back in time.
 const fn backwards(is_backwards: bool) -> &'static str {
-    if is_backwards {
-        "; where nothing dissipates, a run with the energy −H leads back"
-    } else {
-        ""
-    }
+    if is_backwards { "; where nothing dissipates, `.backward()` leads back" } else { "" }
 }
 
 /// A span that cannot be run.
@@ -36,6 +33,40 @@ pub enum SpanError {
         /// The time asked for.
         end: f64,
     },
+    /// A run back in time has an end that is not before its start, or one of them is infinite or NaN.
+    #[error(
+        "the run would go back from t = {start} to t = {end}; its end must be an earlier, finite time, or leave `.backward()` out"
+    )]
+    BackwardEnd {
+        /// The time at which it starts.
+        start: f64,
+        /// The time asked for.
+        end: f64,
+    },
+    /// A model with an entropy is to run back in time.
+    #[error(
+        "a model with an entropy has no run back in time: the second law lets it grow only forward; an entropy that \
+         nothing produces is a Casimir, so list it as one"
+    )]
+    BackwardEntropy,
+    /// A system in surroundings is to run back in time.
+    #[error(
+        "a system with ports or baths has no run back in time: what they have taken is not given back"
+    )]
+    BackwardExchange,
+    /// A run with noise is to go back in time.
+    #[error("a run with noise does not go back in time: its path is not known before its start")]
+    BackwardNoise,
+    /// A run with a jump is to go back in time.
+    #[error(
+        "an event with a jump has no run back in time: the state before the jump is not known from the one after it"
+    )]
+    BackwardJump,
+    /// A run with corners is to go back in time.
+    #[error(
+        "a run back in time has no corners: steps are not cut there; run from corner to corner, each to its own end"
+    )]
+    BackwardCorners,
     /// The steps are shorter than the last digit of the time.
     #[error(
         "at t = {time:.6e} a step of size {h:.1e} does not change the time; let the run start at t = 0, or \
@@ -206,21 +237,23 @@ pub(crate) fn check_step_size(h: f64) -> Result<(), SpanError> {
     if h > 0.0 && h.is_finite() { Ok(()) } else { Err(SpanError::StepSize { h }) }
 }
 
-/// Accepts a finite time after `start`.
-pub(crate) fn check_end(start: f64, end: f64) -> Result<(), SpanError> {
-    if start.is_finite() && end > start && end.is_finite() {
-        Ok(())
-    } else {
-        Err(SpanError::End { start, end })
+/// Accepts a finite time after `start`, or one before it in a run back in time.
+pub(crate) fn check_end(start: f64, end: f64, backward: bool) -> Result<(), SpanError> {
+    let span = direction(backward) * (end - start);
+    match (start.is_finite() && span > 0.0 && end.is_finite(), backward) {
+        (true, _) => Ok(()),
+        (false, true) => Err(SpanError::BackwardEnd { start, end }),
+        (false, false) => Err(SpanError::End { start, end }),
     }
 }
 
 /// Accepts steps of one size that end at a finite time, and of which the first is seen in the time. Times are
-/// products of the count, so later ones are no shorter than their last digit by more than a rounding.
+/// products of the count, so later ones are no shorter than their last digit by more than a rounding. They are negative in a run
+/// back in time.
 pub(crate) fn check_steps(start: f64, h: f64, count: usize) -> Result<(), SpanError> {
     let end = start + count as f64 * h;
-    if start.is_finite() && start + h <= start {
-        return Err(SpanError::Standstill { time: start, h });
+    if start.is_finite() && h.signum() * ((start + h) - start) <= 0.0 {
+        return Err(SpanError::Standstill { time: start, h: h.abs() });
     }
-    check_end(start, end)
+    check_end(start, end, h < 0.0)
 }

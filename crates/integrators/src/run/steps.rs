@@ -135,7 +135,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
             return Err(broken);
         }
         self.check_step(&taken)?;
-        let entered = StepOf { taken: &taken, h };
+        let entered = StepOf { taken: &taken, h: h.abs() };
         self.course.certificate.enter(
             self.flow,
             &self.course.state.point,
@@ -161,7 +161,10 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
         self.course.check_invariants(&self.course.before.state)?;
         let over = match &self.course.progress.step_size {
             StepSize::Fixed(_) => self.course.progress.count.is_some_and(|count| step >= count),
-            StepSize::Adaptive(controller) => self.course.state.time >= controller.pace.end,
+            StepSize::Adaptive(controller) => {
+                let left = controller.pace.end - self.course.state.time;
+                self.course.progress.direction() * left <= 0.0
+            }
         };
         if over {
             self.course.progress.ending = Some(Ending::Span);
@@ -289,7 +292,11 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
         let Stop { stop, recorded: target, .. } = self.course.progress.corners.stop(time, pace.end);
         // After a corner a step begins a few roundings later than its state is recorded.
         let begin = behind.unwrap_or(time);
-        let mut frozen = self.course.frozen.end(self.course.state.step, begin);
+        // Along the run, times and sizes are positive.
+        let direction = self.course.progress.direction();
+        let (along, stop) = (direction * begin, direction * stop);
+        let ends = self.course.frozen.end(self.course.state.step, begin, direction);
+        let mut frozen = ends.map(|end| direction * end);
         if behind.is_some() {
             self.memory = self.method.memory();
         }
@@ -297,24 +304,26 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
             tries += 1;
             if tries == TRIES {
                 // An entry that begins to move only now has no size yet.
-                let here = Scales::at(flow, &self.course.state.point, Some(pace.end - time));
+                let here =
+                    Scales::at(flow, &self.course.state.point, Some((pace.end - time).abs()));
                 self.course.progress.scales = self.course.progress.scales.and(&here);
             }
-            let (h, last) = match frozen {
-                Some(end) => (end.min(stop) - begin, end >= stop),
-                None => pace.attempt(begin, stop),
+            let (size, last) = match frozen {
+                Some(end) => (end.min(stop) - along, end >= stop),
+                None => pace.attempt(along, stop),
             };
+            let h = direction * size;
             if pace.next < pace.least(&rule) && !last && frozen.is_none() {
                 let (h, least) = (pace.next, pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
                 let cause = broken.or_else(|| self.course.dependent(&self.course.state));
                 return Err(cause.unwrap_or(too_small));
             }
-            if begin + h <= begin {
+            if along + size <= along {
                 let standstill = StepError::Standstill { time, h: pace.next };
                 return Err(broken.unwrap_or(standstill));
             }
-            let ratio = pace.taken.map_or(1.0, |taken| h / taken);
+            let ratio = pace.taken.map_or(1.0, |taken| size / taken);
             let mut memory = self.memory.rescaled(ratio);
             memory.take_room(&mut self.memory);
             let allowed = self.course.progress.allowed(relative_error, None, h);
@@ -334,10 +343,10 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
                     error = if holds { self.error(&step, &memory) } else { None };
                     let accepted = error.filter(|error| *error <= 1.0 || frozen.is_some());
                     if holds && is_held {
-                        pace.accept_held(&rule, h);
+                        pace.accept_held(&rule, size);
                     } else if let Some(error) = accepted {
-                        pace.accept(&rule, h, error);
-                        self.look_at_rest(&mut pace, taken, h);
+                        pace.accept(&rule, size, error);
+                        self.look_at_rest(&mut pace, taken, size);
                     }
                     is_taken = holds && (is_held || accepted.is_some());
                 }
@@ -368,23 +377,23 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
             // A step that cannot be taken is taken in parts.
             frozen = None;
             if falls {
-                pace.reject_fall(h);
+                pace.reject_fall(size);
                 self.memory.refused(memory);
                 self.course.certificate.rejected += 1;
                 self.course.certificate.falls_avoided += 1;
                 continue;
             }
-            if pace.may_jump(&rule, begin, h)
+            if pace.may_jump(&rule, begin, size)
                 && let Some(taken) = self.held_in_an_instant(begin + h)
             {
-                pace.jumped(begin, h);
+                pace.jumped(begin, size);
                 self.memory = self.memory.restarted();
                 self.course.progress.set_pace(pace);
                 let time = if last { target } else { begin + h };
                 self.course.frozen.note(time);
                 return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
             }
-            pace.reject(&rule, h, error);
+            pace.reject(&rule, size, error);
             self.memory.reuse(memory);
             self.course.certificate.rejected += 1;
         }

@@ -32,6 +32,7 @@ pub struct Until<const N: usize = 0> {
     pub(crate) every: usize,
     pub(crate) most: Option<usize>,
     pub(crate) rest: Option<f64>,
+    backward: bool,
     entries: Entries<[f64; N]>,
 }
 
@@ -64,9 +65,9 @@ impl Span {
     /// ```
     pub const fn until(end: f64) -> Until {
         let (first, least, largest, most, rest) = (None, None, None, None, None);
-        let (start, every, entries) = (0.0, 1, Entries::Automatic);
+        let (start, every, entries, backward) = (0.0, 1, Entries::Automatic, false);
         let tolerance = TOLERANCE;
-        Until { start, end, tolerance, first, least, largest, every, most, rest, entries }
+        Until { start, end, tolerance, first, least, largest, every, most, rest, backward, entries }
     }
 }
 
@@ -91,8 +92,10 @@ impl Until {
     }
 
     const fn with<const N: usize>(self, entries: Entries<[f64; N]>) -> Until<N> {
-        let Self { start, end, tolerance, first, least, largest, every, most, rest, .. } = self;
-        Until { start, end, tolerance, first, least, largest, every, most, rest, entries }
+        let Self {
+            start, end, tolerance, first, least, largest, every, most, rest, backward, ..
+        } = self;
+        Until { start, end, tolerance, first, least, largest, every, most, rest, backward, entries }
     }
 }
 
@@ -115,6 +118,12 @@ impl<const N: usize> Until<N> {
     #[must_use]
     pub const fn starting_at(self, start: f64) -> Self {
         Self { start, ..self }
+    }
+
+    /// Goes back in time, to an end before the start, see [`Watch::backward`](crate::Watch::backward).
+    #[must_use]
+    pub const fn backward(self) -> Self {
+        Self { backward: true, ..self }
     }
 
     /// The first step to try, instead of the automatic one.
@@ -176,12 +185,23 @@ impl<const N: usize> Until<N> {
 
 impl<const N: usize> From<Until<N>> for Schedule {
     fn from(until: Until<N>) -> Self {
-        let Until { start, end, tolerance, first, least, largest, every, most, rest, entries } =
-            until;
+        let Until {
+            start,
+            end,
+            tolerance,
+            first,
+            least,
+            largest,
+            every,
+            most,
+            rest,
+            backward,
+            entries,
+        } = until;
         let Ok(entries) = entries.convert(|_, numbers| Ok::<_, Infallible>((*numbers).into()));
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
         let (watch, corners, frozen) = (Requests::default(), Corners::default(), Frozen::No);
-        Self { size, start, count: None, every, most, rest, watch, corners, frozen }
+        Self { size, start, backward, count: None, every, most, rest, watch, corners, frozen }
     }
 }
 

@@ -131,6 +131,45 @@ pub trait Watch: Into<Schedule> {
         Schedule { start, ..self.into() }
     }
 
+    /// Goes back in time: `x' = Π dH` is followed from the start `t₀` to earlier times, so that times fall along the run. In the time
+    /// `s = t₀ − t` it is `x' = Π d(−H)`, and a step of the size `h` is one of `−h` by the equation of the method. The energy of states and
+    /// certificate is `H`.
+    ///
+    /// A symmetric method, as the midpoint rule and [`Gauss`](crate::Gauss) in steps of one size, goes back through the states it
+    /// came by, to the tolerance of its solver. Another one is off by its error.
+    ///
+    /// - Sizes, intervals and tolerances are positive as ever. The end and the outputs are times before the start.
+    /// - The direction of an [event](Self::event) is that along the run: one that rises forward [falls](Watched::falling) on the way
+    ///   back.
+    /// - An energy that depends on the time is evaluated at the times that fall.
+    ///
+    /// A run is [refused](crate::SpanError) with an entropy, with noise, with ports or baths, with jumps and with corners, and derivatives of
+    /// it too.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Symplectic, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Method, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// use num_dual::DualNum;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// let pendulum = System::on(Euclidean::<2>)
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 - x.x.cos())
+    ///     .build()?;
+    /// let there = DormandPrince8.run(&pendulum, vector![1.0, 0.0], Span::until(5.0).tolerance(1e-10))?;
+    /// let span = Span::until(0.0).starting_at(5.0).backward().tolerance(1e-10);
+    /// let back = DormandPrince8.run(&pendulum, there.last().point, span)?;
+    /// assert!(back.last().time == 0.0 && (back.last().point - vector![1.0, 0.0]).norm() < 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    fn backward(self) -> Schedule {
+        Schedule { backward: true, ..self.into() }
+    }
+
     /// Records the start and every `every`-th state after it, and always the last.
     #[must_use]
     fn every(self, every: usize) -> Schedule {

@@ -44,9 +44,10 @@ impl<M: StateSpace> Watching<M> {
         (last, counts): (&[LastNumber], &[EventCount]),
     ) -> Result<Option<Box<Self>>, SpanError> {
         let start = progress.start;
-        requests.check([start, progress.end()], progress.next_end(state.time))?;
+        let next_end = progress.next_end(state.time);
+        requests.check([start, progress.end()], next_end, progress.direction())?;
         let Requests { times, interval, events } = requests;
-        let outputs = Outputs::after(state.time, start, times, interval).until(progress.end());
+        let outputs = Outputs::of(progress, state.time, times, interval);
         let events = Events::new(events, state, last, counts)?;
         if outputs.is_empty() && events.is_empty() {
             return Ok(None);

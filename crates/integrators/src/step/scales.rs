@@ -49,7 +49,7 @@ impl<V: Vector> Scales<V> {
 
 /// The rounding of a displacement in the time `h`, of a velocity with terms of this size.
 pub(crate) fn rounding(terms: f64, h: f64) -> f64 {
-    terms * (16.0 * f64::EPSILON * h)
+    terms * (16.0 * f64::EPSILON * h.abs())
 }
 
 /// The larger one of two sizes, entry by entry.

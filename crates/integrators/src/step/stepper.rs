@@ -110,7 +110,7 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
         Ok(())
     }
 
-    /// Takes a step of size `h`, in parts if needed.
+    /// Takes a step of size `h`, in parts if needed. It is negative in a run [back in time](crate::Watch::backward).
     ///
     /// A run calls it in the [room](Flow::room) of the flow ([`in_room`](super::in_room)); so does a caller that steps a large system by itself.
     ///

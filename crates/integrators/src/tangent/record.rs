@@ -79,6 +79,9 @@ pub trait Tangents: Sized {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
+        if schedule.backward {
+            return Err(TangentError::Broken { what: "a run back in time" });
+        }
         // Where a path ends a step beyond the event, the time of the event has no derivative.
         if self.noise(system.as_flow()).is_some() && !schedule.watch.events.is_empty() {
             return Err(TangentError::Broken { what: "events on a path with noise" });

@@ -139,6 +139,9 @@ impl<F: SmoothFlow> Tape<F> {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
+        if schedule.backward {
+            return Err(TangentError::Broken { what: "a run back in time" });
+        }
         let steps = method.steps(system.as_flow(), x0, schedule.clone())?;
         let mut recording =
             steps.recording(steps.state().clone()).map_err(RunError::<F::Space>::from)?;

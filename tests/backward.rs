@@ -62,10 +62,7 @@ fn there_and_back<F: Flow, M: Method<F> + Clone>(
     let end = begin + f64::from(count) * h;
     let fixed = Span::steps(h, count as usize);
     let spans: [(Schedule, Schedule); 2] = [
-        (
-            fixed.starting_at(begin).into(),
-            fixed.starting_at(end).backward().into(),
-        ),
+        (fixed.starting_at(begin).into(), fixed.starting_at(end).backward().into()),
         (
             Span::until(end).starting_at(begin).tolerance(1e-8).into(),
             Span::until(begin).starting_at(end).backward().tolerance(1e-8).into(),
@@ -176,11 +173,8 @@ fn driven() -> impl Fn(Real, &Vector2<Real>) -> Real {
 
 #[test]
 fn the_time_of_a_driven_system_runs_back_too() {
-    let open = System::on(Euclidean::<2>)
-        .bracket(Symplectic)
-        .energy_in_time(driven())
-        .build()
-        .unwrap();
+    let open =
+        System::on(Euclidean::<2>).bracket(Symplectic).energy_in_time(driven()).build().unwrap();
     // `q(t) = cos t + (2 sin t − sin 2t)/3` solves `q'' = sin 2t − q`, at negative times too.
     let q = |t: f64| t.cos() + (2.0 * t.sin() - (2.0 * t).sin()) / 3.0;
     macro_rules! back {

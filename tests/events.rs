@@ -342,3 +342,117 @@ fn an_event_across_a_nan_at_the_end_of_a_step_is_found_by_every_method() {
         assert!(times.iter().zip(&expected).all(near), "{name}: {times:?}");
     }
 }
+
+/// A run that is put down after each of its steps ends where the whole one does, with its counts.
+fn counted_across_files<Y, M>(system: &Y, method: &M, span: &Schedule, n: usize)
+where
+    Y: Flow,
+    M: Method<Y> + Clone,
+    Element<Y>: Clone,
+{
+    let start = || system.element(&[1.0, 0.0]).expect("a point");
+    let whole = method.clone().run(system, start(), span.clone()).expect("it runs");
+    assert_eq!((whole.ending(), whole.count("up")), (Ending::Event { index: 1 }, Some(n)));
+    for put_down in [1, 17, 40] {
+        let mut steps = method.clone().steps(system, start(), span.clone()).expect("it runs");
+        for _ in 0..put_down {
+            steps.advance().expect("it runs");
+        }
+        let text = serde_json::to_string(&steps.checkpoint()).expect("it is written");
+        let read: Checkpoint = serde_json::from_str(&text).expect("it is read");
+        let resumed = method.clone().resume(system, &read).expect("it is resumed");
+        let resumed = resumed.watching(span.clone()).expect("it watches").run().expect("it runs");
+        assert_eq!(resumed.last(), whole.last(), "after {put_down} steps");
+        assert_eq!(resumed.certificate(), whole.certificate());
+        assert_eq!(resumed.checkpoint(), whole.checkpoint());
+    }
+}
+
+#[test]
+fn a_run_stops_at_the_nth_event_by_every_method() {
+    let system = oscillator();
+    let turns = 5;
+    let asked = |span: Schedule| -> Schedule {
+        // The others are counted up to the stop, in whatever order they were asked for.
+        span.event("node", |x: &Plane| x.x)
+            .event("up", |x: &Plane| x.x)
+            .rising()
+            .stop_after(turns)
+            .event("never", |x: &Plane| x.x - 2.0)
+            .into()
+    };
+    // It rises at 3π/2 + 2πk.
+    let exact = 2.0 * PI * (turns as f64 - 0.25);
+    macro_rules! stops {
+        ($($method:expr, $tolerance:expr, $allowed:expr);+) => {$({
+            for span in [
+                asked(Span::until(100.0).tolerance($tolerance).into()),
+                asked(Span::steps(0.05, 2000).into()),
+            ] {
+                let run = $method.run(&system, START, span.clone()).unwrap();
+                assert!(run.ending() == Ending::Event { index: 1 }, "{:?}", run.ending());
+                let counts = ["node", "up", "never", "other"].map(|name| run.count(name));
+                assert_eq!(counts, [Some(2 * turns), Some(turns), Some(0), None]);
+                let off = (run.last().time - exact).abs();
+                println!("{}: off by {off:.1e}", stringify!($method));
+                assert!(off < $allowed && run.events().len() == 3 * turns, "{off:.1e}");
+                assert_eq!(run.last(), &run.events().last().unwrap().state);
+                let text = run.certificate().to_string();
+                assert!(text.contains("events:      up 5 times") && text.contains("never 0 times"), "{text}");
+            }
+            counted_across_files(&system, &$method, &asked(Span::steps(0.05, 2000).into()), turns);
+            counted_across_files(&system, &$method, &asked(Span::until(100.0).tolerance($tolerance).into()), turns);
+        })+};
+    }
+    // The midpoint rule is late by h²/12 of the time.
+    stops!(
+        Scheme::new(WeylMidpoint), 1e-6, 0.01;
+        Gauss::<2>, 1e-8, 1e-4;
+        Radau::<2>, 1e-8, 1e-3;
+        DormandPrince5, 1e-8, 1e-5;
+        DormandPrince8, 1e-8, 1e-6;
+        RungeKuttaChebyshev, 1e-6, 0.1
+    );
+    // The first time is `stop`; several times in one step, and no times.
+    let first = |span: Watched| DormandPrince8.run(&system, START, span).unwrap();
+    let node = || Span::until(100.0).tolerance(1e-8).event("node", |x: &Plane| x.x);
+    assert_eq!(first(node().stop_after(1)), first(node().stop()));
+    let fast = |n| Span::steps(1.0, 40).event("f", |x: &Plane| (9.0 * x.x).sin()).stop_after(n);
+    let all = first(Span::steps(1.0, 40).event("f", |x: &Plane| (9.0 * x.x).sin()));
+    for n in [1, 2, 3, 4, 7, 20] {
+        let run = first(fast(n));
+        assert_eq!((run.count("f"), run.events()), (Some(n), &all.events()[..n]));
+    }
+    let none = DormandPrince8.run(&system, START, node().stop_after(0)).unwrap_err();
+    assert!(matches!(none, RunError::Span(SpanError::StopAfterNone { index: 0 })), "{none}");
+    println!("{none}");
+    // From its end a run goes on to the next multiple.
+    let run = first(node().stop_after(3));
+    let resumed = DormandPrince8.resume(&system, &run.checkpoint().clone().with_end(99.0).unwrap());
+    let resumed = resumed.unwrap().watching(node().stop_after(3)).unwrap().run().unwrap();
+    assert_eq!((resumed.count("node"), resumed.events().len()), (Some(6), 3));
+    assert!((resumed.last().time - 5.5 * PI).abs() < 1e-5);
+}
+
+#[test]
+fn a_run_stops_before_the_nth_bounce() {
+    // A ball falls for one unit of time, and is at the wall again after each two.
+    let ball = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .build()
+        .unwrap();
+    for span in [Schedule::from(Span::until(99.0).tolerance(1e-10)), Span::steps(0.3, 330).into()] {
+        let span = span
+            .event("wall", |x: &Plane| x.x)
+            .falling()
+            .jump(|_, x: &Plane| vector![x.x, -x.y])
+            .stop_after(4);
+        let run = DormandPrince8.run(&ball, vector![0.5, 0.0], span).unwrap();
+        assert_eq!((run.ending(), run.count("wall")), (Ending::Event { index: 0 }, Some(4)));
+        assert!((run.last().time - 7.0).abs() < 1e-8, "{}", run.last().time);
+        // Three jumps, and the state before the fourth one.
+        assert_eq!(run.certificate().jumps[0].count, 3);
+        assert!(run.last().point.y < 0.0 && run.events()[3].jump.is_none());
+    }
+}

@@ -191,7 +191,7 @@ fn a_run_back_in_time_is_refused_with_what_leads_back() {
     for span in spans {
         let error =
             DormandPrince8.run(&system, vector![1.0, 0.0], span).expect_err("it is refused");
-        assert!(error.to_string().contains("a run with the energy −H leads back"), "{error}");
+        assert!(error.to_string().contains("`.backward()` leads back"), "{error}");
     }
     let forward =
         Explicit::Order8.run(&system, vector![1.0, 0.0], Span::steps(0.1, 10)).expect("it runs");

@@ -54,6 +54,7 @@ mod npy;
 use std::fmt;
 use std::io::{self, Seek, Write};
 
+use crate::run::event::Event;
 use crate::run::state::State;
 use crate::step::{Flow, HasFlow, StateSpace};
 
@@ -160,6 +161,46 @@ impl<'a, M: StateSpace> Observables<'a, M> {
         table.lines.push('\n');
         table.flush()?;
         Ok(table)
+    }
+
+    /// Writes a table of [events](Event) as comma-separated values: the name `event`, the `direction`, which is `rises` or `falls`, and
+    /// the numbers of the state at which it was found.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Observables, Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::until(20.0).event("node", |p: &Vector3<f64>| p.y).stop_after(2);
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// let mut table = Vec::new();
+    /// Observables::on(&body).of("p1", |p| p.x).events_csv(run.events(), &mut table)?;
+    /// let text = String::from_utf8(table)?;
+    /// assert!(text.starts_with("event,direction,t,p1\nnode,falls,1.26") && text.lines().count() == 3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`ObservablesError`]: two columns of one name, and those of writing to `to`.
+    pub fn events_csv<W: Write>(&self, events: &[Event<M>], mut to: W) -> io::Result<()> {
+        self.check_names()?;
+        let names: Vec<_> = self.names().map(quoted).collect();
+        writeln!(to, "event,direction,{}", names.join(","))?;
+        for event in events {
+            write!(to, "{},{}", quoted(&event.name), if event.rises { "rises" } else { "falls" })?;
+            for number in self.row(&event.state) {
+                write!(to, ",{number:?}")?;
+            }
+            writeln!(to)?;
+        }
+        to.flush()
     }
 
     /// An array of `numpy` with one named `<f8` column for each number (format version 1.0, or 3.0 for

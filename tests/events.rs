@@ -435,6 +435,35 @@ fn a_run_stops_at_the_nth_event_by_every_method() {
 }
 
 #[test]
+fn a_lattice_closed_or_open_stops_at_the_nth_event() {
+    // Two oscillators without a bond, of which the second one turns as `START` does.
+    let closed = || {
+        Lattice::on(Graph::from_bonds(2, []), Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap()
+    };
+    let exact = 2.0 * PI * 2.75;
+    let span = || Span::until(100.0).tolerance(1e-9);
+    let lattice = closed();
+    let start = lattice.points(|i| START * i as f64);
+    let asked = span().event("up", |x: &Points<Euclidean<2>>| x[1].x).rising().stop_after(3);
+    let run = DormandPrince8.run(&lattice, start, asked).unwrap();
+    assert_eq!(run.count("up"), Some(3));
+    assert!((run.last().time - exact).abs() < 1e-6, "{}", run.last().time);
+    let open = closed().opened().energy_in_time(|t, site, x: &Vector2<Real>| {
+        x.x * (t * 3.0).sin() * if site == 0 { 0.1 } else { 0.0 }
+    });
+    let start = open.start(open.lattice().points(|i| START * i as f64));
+    type Open = OpenState<Points<Euclidean<2>>>;
+    let asked = span().event("up", |x: &Open| x.x[1].x).rising().stop_after(3);
+    let run = DormandPrince8.run(&open, start, asked).unwrap();
+    assert_eq!((run.ending(), run.count("up")), (Ending::Event { index: 0 }, Some(3)));
+    assert!((run.last().time - exact).abs() < 1e-6, "{}", run.last().time);
+}
+
+#[test]
 fn a_run_stops_before_the_nth_bounce() {
     // A ball falls for one unit of time, and is at the wall again after each two.
     let ball = System::on(Euclidean::<2>)

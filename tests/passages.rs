@@ -380,6 +380,9 @@ fn events_of_one_time_come_one_after_the_other() {
     assert_eq!(stopped.last(), &both.events()[0].state);
     // The signs differ at the ends of the step before each of them.
     let all = run(Span::steps(0.05, 400).event("level", level).into());
+    let third = run(Span::steps(0.05, 400).event("level", level).stop_after(3).into());
+    assert_eq!((third.ending(), third.count("level")), (Ending::Event { index: 0 }, Some(3)));
+    assert!(third.events() == &all.events()[..3] && third.last() == &all.events()[2].state);
     let signs = all.states().windows(2).filter(|w| {
         let [a, b] = [level(&w[0].point), level(&w[1].point)];
         a * b < 0.0

@@ -183,18 +183,18 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
     pub fn advance(&mut self, next: &State<LieDual<3>>) -> Result<&Matrix3<f64>, AttitudeError> {
         let (from, to) = (self.state.step, next.step);
         // A jump may have led to it, and a run may end inside a step.
-        let is_within = to == from && next.time >= self.state.time;
-        if !(is_within || to == from + 1) {
+        if !(to == from || to == from + 1) {
             return Err(AttitudeError::Skipped { from, to });
         }
-        if next.time > self.state.time {
+        // In a run back in time it is the earlier one.
+        if (next.time - self.state.time).abs() > 0.0 {
             self.follow(next)?;
         }
         self.state = next.clone();
         Ok(&self.rotation)
     }
 
-    /// Follows the motion to a state at a later time.
+    /// Follows the motion to a state at another time.
     fn follow(&mut self, next: &State<LieDual<3>>) -> Result<(), AttitudeError> {
         let turn = self.velocity(next)? * step_size(&self.state, next);
         let (p, half) = (next.point, 0.5 * turn.norm());
@@ -225,7 +225,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
 fn step_size(from: &State<LieDual<3>>, to: &State<LieDual<3>>) -> f64 {
     let mean = to.time / to.step as f64;
     let off = (from.time - from.step as f64 * mean).abs();
-    if off <= 4.0 * f64::EPSILON * to.time { mean } else { to.time - from.time }
+    if off <= 4.0 * f64::EPSILON * to.time.abs() { mean } else { to.time - from.time }
 }
 
 /// Whether the bracket of the algebra is the cross product.

@@ -1,7 +1,9 @@
 //! Runs back in time: there and back by every method on every kind of system, and the reasons for a refusal.
 
 use metriplectic::equations::{Equations, Sizes};
-use metriplectic::integrators::{Element, Flow, FromEquations, Schedule, SpanError, StateSpace};
+use metriplectic::integrators::{
+    Element, Flow, FromEquations, Schedule, SpanError, StateSpace, TangentError,
+};
 use metriplectic::prelude::*;
 use nalgebra::Vector1;
 
@@ -294,15 +296,17 @@ fn outputs_and_events_lie_along_a_run_that_goes_back() {
     assert!(matches!(later.with_end(3.0), Err(ResumeError::FixedSteps)));
 }
 
+/// The refusal of a run.
+fn span<M: StateSpace>(run: Result<Trajectory<M>, RunError<M>>) -> SpanError {
+    match run {
+        Err(RunError::Span(error)) => error,
+        other => panic!("{:?}", other.map(|run| run.last().time)),
+    }
+}
+
 #[test]
 fn what_has_no_way_back_says_why() {
     let back = || Span::steps(0.1, 10).backward();
-    fn span<M: StateSpace>(run: Result<Trajectory<M>, RunError<M>>) -> SpanError {
-        match run {
-            Err(RunError::Span(error)) => error,
-            other => panic!("{:?}", other.map(|run| run.last().time)),
-        }
-    }
     let warm = System::on(LieDual::so3())
         .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
@@ -341,9 +345,9 @@ fn what_has_no_way_back_says_why() {
     // At t = 10¹⁰ no such step is seen in the time.
     let still = run(Span::steps(1e-9, 10).starting_at(1e10).backward().into());
     assert!(matches!(still, SpanError::Standstill { .. }), "{still}");
-    let tangent = DormandPrince8.tangent(&pendulum, vector![0.7, 0.0], back());
+    let tangent = DormandPrince8.tangent(&warm, p, back());
     assert!(matches!(tangent, Err(TangentError::Broken { .. })));
-    let adjoint = DormandPrince8.adjoint(&pendulum, vector![0.7, 0.0], back());
+    let adjoint = DormandPrince8.adjoint(&warm, p, back());
     assert!(matches!(adjoint, Err(TangentError::Broken { .. })));
     for error in [entropy, exchange, noise, run(back().corners([-0.3])), ends, word] {
         println!("{error}");

@@ -203,9 +203,9 @@ python:
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2> /dev/null || not_tried 'there is no Python 3.10 or newer'
     python3 -m venv "$work/env" 2> /dev/null || not_tried 'python3 -m venv does not work'
     "$work/env/bin/pip" install --quiet --disable-pip-version-check \
-        'maturin>=1.9,<2' 'numpy>=1.26' scipy matplotlib pandas tqdm pytest mypy sympy \
+        'maturin>=1.9,<2' 'numpy>=1.26' scipy matplotlib pandas tqdm pytest mypy sympy joblib \
         || not_tried 'its packages cannot be installed'
-    for module in jax dask joblib; do
+    for module in jax dask ray; do
         "$work/env/bin/python" -c "import $module" 2> /dev/null || echo "python: without $module, whose tests are left out"
     done
     cd python

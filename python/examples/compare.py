@@ -2,11 +2,15 @@
 
 Each solver takes the tolerances from 1e-4 to 1e-12, and the table has the fastest run whose error at the end is below 1e-7. Times are CPU
 milliseconds of one run, the best of several; compiling is said apart. The reference is DOP853 at 1e-13 of equations by hand.
+
+``python examples/compare.py`` prints the table, and with ``--readme`` writes it into README.md.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -15,6 +19,8 @@ import metriplectic as mp
 
 GOAL = 1e-7
 TOLERANCES = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12]
+# The comments of README.md between which the table is written.
+BEGIN, END = "<!-- examples/compare.py --readme writes from here -->", "<!-- to here -->"
 INERTIA = np.array([10.0, 5.0, 1.0])
 SPRINGS = np.array([1.0, 0.5, 0.25])
 
@@ -128,33 +134,15 @@ def fastest(solve, exact):
     return found
 
 
-def rows(problem):
-    name, system, rate, jax_rate, start, end = problem
-    exact = solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
-    yield name, None, None
-
-    def ours(tol):
-        run = checked.run(start, t=end, tol=tol, method="dp8")
-        return run.t, run.y
-
-    checked = system.verified(start)
-    yield "this package, dp8", fastest(ours, exact), system
-    took, _ = best(lambda: system.verify(start))
-    yield f"… its check of the model, once: {took:.2f} ms", None, None
-
-    def scipy(tol):
-        run = solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=tol, atol=1e-2 * tol)
-        return run.t, run.y.T
-
-    yield "SciPy, DOP853", fastest(scipy, exact), system
+def diffrax_solver(jax_rate, start, end):
+    """Runs of diffrax at a tolerance, and the CPU seconds that each of them took to compile; None where it is not installed."""
     try:
         import diffrax
         import jax
     except ImportError:
-        yield "diffrax is not installed", None, None
-        return
+        return None, []
     jax.config.update("jax_enable_x64", True)
-    field, compiled = jax_rate(jax.numpy, jax), {}
+    field, compiled, compiling = jax_rate(jax.numpy, jax), {}, []
 
     def solve(tol):
         if tol not in compiled:
@@ -170,27 +158,71 @@ def rows(problem):
         count = int(run.stats["num_accepted_steps"]) + 1
         return np.array(run.ts)[:count], np.array(run.ys)[:count]
 
-    compiling: list[float] = []
-    yield "diffrax, Dopri8", fastest(solve, exact), system
-    yield f"… compiling it: {min(compiling):.1f} s of CPU", None, None
+    return solve, compiling
+
+
+def compared(problem):
+    """Lines of the table for one problem, and the CPU time of each solver."""
+    name, system, rate, jax_rate, start, end = problem
+    exact = solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    checked, times, lines = system.verified(start), {}, [f"| **{name}** | | | | | |"]
+
+    def add(solver, solve):
+        times[solver], error, y, steps = fastest(solve, exact)
+        laws = system.laws(y)
+        drift = np.abs(laws[:, 0] - laws[0, 0]).max()
+        has_entropy = system._definition.entropy is not None
+        falls = int((np.diff(laws[:, 1]) < 0).sum()) if has_entropy else "–"
+        lines.append(f"| {solver} | {times[solver]:.2f} | {steps} | {error:.1e} | {drift:.1e} | {falls} |")
+
+    def ours(tol):
+        run = checked.run(start, t=end, tol=tol, method="dp8")
+        return run.t, run.y
+
+    def scipy(tol):
+        run = solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=tol, atol=1e-2 * tol)
+        return run.t, run.y.T
+
+    add("this package, dp8", ours)
+    times["check"], _ = best(lambda: system.verify(start), tries=20)
+    lines.append(f"| … its check of the model, once: {times['check']:.2f} ms | | | | | |")
+    add("SciPy, DOP853", scipy)
+    solve, compiling = diffrax_solver(jax_rate, start, end)
+    if solve is None:
+        lines.append("| diffrax is not installed | | | | | |")
+    else:
+        add("diffrax, Dopri8", solve)
+        lines.append(f"| … compiling it: {min(compiling):.1f} s of CPU | | | | | |")
+    return lines, times
 
 
 def table():
-    """The table in Markdown."""
+    """The table in Markdown, and what it says of this package beside the others."""
     lines = ["| | CPU ms | steps | error at the end | drift of H | falls of S |", "|---|--:|--:|--:|--:|--:|"]
+    found = []
     for problem in (body(), spin(), chain()):
-        for name, found, system in rows(problem):
-            if found is None:
-                lines.append(f"| {'**' + name + '**' if system is None and not name.startswith('…') else name} | | | | | |")
-                continue
-            took, error, y, steps = found
-            laws = system.laws(y)
-            drift = np.abs(laws[:, 0] - laws[0, 0]).max()
-            has_entropy = system._definition.entropy is not None
-            falls = f"{int((np.diff(laws[:, 1]) < 0).sum())}" if has_entropy else "–"
-            lines.append(f"| {name} | {took:.2f} | {steps} | {error:.1e} | {drift:.1e} | {falls} |")
+        of_problem, times = compared(problem)
+        lines += of_problem
+        found.append(times)
+    for solver in ("SciPy, DOP853", "diffrax, Dopri8"):
+        if all(solver in times for times in found):
+            alone = [times[solver] / times["this package, dp8"] for times in found]
+            checked = [times[solver] / (times["this package, dp8"] + times["check"]) for times in found]
+            # An empty line ends the table.
+            lines += ([""] if solver.startswith("SciPy") else []) + [
+                f"- {solver.split(',')[0]} takes {min(alone):.1f} to {max(alone):.1f} times the CPU time of a run of this package, and "
+                f"{min(checked):.1f} to {max(checked):.1f} times that of a run with its check."
+            ]
     return "\n".join(lines)
 
 
+def write(page, text):
+    """Replaces what is between the comments of a page."""
+    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
 if __name__ == "__main__":
-    print(table())
+    print(found := table())
+    if "--readme" in sys.argv[1:]:
+        write(Path(__file__).parents[1] / "README.md", found)

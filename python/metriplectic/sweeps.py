@@ -69,7 +69,7 @@ def sweep(
         A file to which each row is written when it is done. A sweep that begins again with it runs the rows that are missing.
     map : function, optional
         Maps a function over a list, in the order of the list, in place of threads: that of a pool of processes, or
-        ``lambda f, rows: dask.compute(*[dask.delayed(f)(row) for row in rows])``.
+        ``lambda f, rows: dask.compute(*[dask.delayed(f)(row) for row in rows])``. The page has those of joblib and ray.
     options
         Those of ``System.run``.
 

@@ -70,11 +70,26 @@ def test_a_cluster_of_dask_has_the_same_table():
     assert many.rows == one.rows
 
 
-def test_joblib_takes_a_system():
+def test_joblib_has_the_same_table():
     joblib = pytest.importorskip("joblib")
-    system = pendulum()
-    runs = joblib.Parallel(n_jobs=2)(joblib.delayed(system(gamma=g).run)([1.0, 0.0, 0.0], t=1.0) for g in (0.1, 0.2))
-    assert (runs[1].y == system(gamma=0.2).run([1.0, 0.0, 0.0], t=1.0).y).all()
+    options = dict(y0=[1.2, 0.0, 0.0], t=3.0, tol=1e-8)
+    one = mp.sweep(pendulum(), GRID, threads=1, **options)
+    many = mp.sweep(pendulum(), GRID, map=lambda f, rows: joblib.Parallel(n_jobs=2)(joblib.delayed(f)(row) for row in rows), **options)
+    assert many.rows == one.rows
+
+
+def test_ray_has_the_same_table():
+    ray = pytest.importorskip("ray")
+    options = dict(y0=[1.2, 0.0, 0.0], t=3.0, tol=1e-8)
+    one = mp.sweep(pendulum(), GRID, threads=1, **options)
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    try:
+        many = mp.sweep(
+            pendulum(), GRID, map=lambda f, rows: ray.get([ray.remote(lambda row: f(row)).remote(row) for row in rows]), **options
+        )
+    finally:
+        ray.shutdown()
+    assert many.rows == one.rows
 
 
 def test_a_journal_takes_a_sweep_up_again(tmp_path):

@@ -88,7 +88,7 @@ def langevin(noise):
 
 
 def test_noise_has_the_variance_of_the_bath():
-    runs = langevin(0.5).paths([0.0, 0.0], 1200, h=0.05, steps=160, each=160, method="dp5", seed=3, threads=2)
+    runs = langevin(0.5).paths([0.0, 0.0], 1200, h=0.1, steps=80, each=80, method="dp5", seed=3, threads=2)
     ends = np.array([run.y[-1] for run in runs])
     assert len({end.tobytes() for end in ends}) == 1200
     # k_B T = 1, with the standard error √(2/1200) of a variance.

@@ -162,11 +162,16 @@ def test_a_run_that_fails_has_the_states_before():
 
 
 def test_an_interrupt_gives_the_run_so_far():
+    # A shell ignores the signal for what it starts in the background.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.4, lambda: signal.raise_signal(signal.SIGINT))
     timer.start()
     begin = time.monotonic()
-    with pytest.raises(KeyboardInterrupt) as caught:
-        body().run(START, h=1e-3, steps=10**9, each=10**5, method="dp5")
+    try:
+        with pytest.raises(KeyboardInterrupt) as caught:
+            body().run(START, h=1e-3, steps=10**9, each=10**5, method="dp5")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert time.monotonic() - begin < 20
     partial = caught.value.partial
     assert partial.certificate.steps > 100 and "first law" in str(partial.certificate)
@@ -174,14 +179,24 @@ def test_an_interrupt_gives_the_run_so_far():
 
 def test_progress_calls_a_function_with_rising_times():
     seen = []
-    body().run(START, t=4000.0, h=0.01, each=10**6, method="dp8", progress=seen.append)
-    assert len(seen) >= 2 and (np.diff(seen) > 0).all() and 0.0 < seen[0] < 4000.0
+    body().run(START, t=800.0, h=0.01, each=10**6, method="dp8", progress=seen.append)
+    assert len(seen) >= 2 and (np.diff(seen) > 0).all() and 0.0 < seen[0] < 800.0
 
     def stop(_):
         raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):
         body().run(START, h=1e-3, steps=10**9, each=10**6, progress=stop)
+
+
+def test_sizes_of_any_number_of_entries_are_taken():
+    ring = mp.System(mp.R(34), energy=lambda x: 0.5 * x @ x, poisson="symplectic")
+    start, options = np.eye(34)[0], dict(t=3.0, tol=1e-6)
+    sized = ring.run(start, scale=np.full(34, 1e-3), **options)
+    assert len(sized) > len(ring.run(start, scale=np.ones(34), **options))
+    assert len(ring.run(start, absolute=np.full(34, 1e-2), **options)) < len(sized)
+    with pytest.raises(mp.Error, match="33"):
+        ring.run(start, scale=np.ones(33), **options)
 
 
 def test_a_bar_is_shown(capsys):

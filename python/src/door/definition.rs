@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
-use metriplectic::equations::Kind;
-use metriplectic::recording::Tape;
+use metriplectic_equations::Kind;
+use metriplectic_recording::Tape;
 use pyo3::prelude::*;
 
 use super::errors::{ModelError, bad, in_python};

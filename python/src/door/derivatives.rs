@@ -4,14 +4,14 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use metriplectic::dynamics::ModelError as Broken;
-use metriplectic::fields::Real;
-use metriplectic::integrators::tangent::SmoothFlow;
-use metriplectic::integrators::{
+use metriplectic_dynamics::ModelError as Broken;
+use metriplectic_fields::Real;
+use metriplectic_integrators::tangent::SmoothFlow;
+use metriplectic_integrators::{
     Adjoints as _, Differentiated, Element, Listed, Schedule, Sensitivity, Stepper, SystemAt,
-    Systems, TangentRun, Tangents as _,
+    TangentRun, Tangents as _,
 };
-use nalgebra::{DMatrix, SVector};
+use nalgebra::DMatrix;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods as _, PyReadonlyArray1,
     PyReadonlyArray2,
@@ -50,47 +50,6 @@ type Beside = RefCell<HashMap<Vec<u64>, Parts>>;
 /// The most systems that are kept.
 const MOST_KEPT: usize = 4096;
 
-/// The numbers of parameters of which there is an instance: a list is filled up to the next one by parameters that do nothing.
-macro_rules! counts {
-    ($then:ident) => {
-        $then!(1 2 3 4 5 6 7 8 9 10 11 12 14 16 20 24 28 32 40 48 56 64 80 96 112 128 160 192 224 256 320 384 448 512)
-    };
-}
-
-/// Calls `work` with a system whose parameters are displaced by differences.
-fn with_parameters<F>(
-    along: &Along,
-    theta: &[f64],
-    build: &dyn Fn(&[f64]) -> PyResult<F>,
-    work: &mut dyn FnMut(&SystemAt<'_, F>) -> PyResult<()>,
-) -> PyResult<()> {
-    macro_rules! by_count {
-        ($($p:literal)*) => {
-            match along.places.len() {
-                $(0..=$p => {
-                    let name = |k: usize| along.names.get(k).copied().unwrap_or("");
-                    let names: [&'static str; $p] = std::array::from_fn(name);
-                    // A parameter is its size, displaced by as much as the true one: so zero has a size too.
-                    let size = |k: usize, _| along.sizes.get(k).copied().unwrap_or(1.0);
-                    let at = SVector::<f64, $p>::from_fn(size);
-                    let systems = Systems::new(names, |phi: &SVector<f64, $p>| {
-                        let mut theta = theta.to_vec();
-                        for (k, &place) in along.places.iter().enumerate() {
-                            theta[place] += phi[k] - at[k];
-                        }
-                        build(&theta)
-                    });
-                    work(&systems.at(at)?)
-                })*
-                many => Err(bad(format!(
-                    "derivatives along {many} parameters are asked for, and 512 are the most; take some of them by `along=`"
-                ))),
-            }
-        };
-    }
-    counts!(by_count)
-}
-
 /// The derivatives of the time of an event and of the state there, along the start and along the parameters, or why there are none.
 type AlongEvent = Result<[Vec<f64>; 4], String>;
 
@@ -105,7 +64,7 @@ struct Tangent {
     along_parameters: Vec<f64>,
     ledger: Vec<(String, Vec<f64>, Vec<f64>)>,
     events: Vec<(String, f64, AlongEvent)>,
-    certificate: Box<metriplectic::integrators::Certificate>,
+    certificate: Box<metriplectic_integrators::Certificate>,
     sensitivity: Sensitivity,
     lengths: [usize; 2],
 }
@@ -482,7 +441,7 @@ impl RawSystem {
                 let open = self.open_with(self.kept(&kept, theta)?, theta, look);
                 open.ok_or_else(|| bad("the system is closed"))
             };
-            return self.along_parameters(along, &build, &mut |system| {
+            return self.along_parameters(along, &build, &|system| {
                 asked.tangent(system, &**system, p, names, Derivatives::Parameters)
             });
         }
@@ -492,7 +451,7 @@ impl RawSystem {
         }
         let kept = Beside::default();
         let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
-        self.along_parameters(along, &build, &mut |system| {
+        self.along_parameters(along, &build, &|system| {
             asked.tangent(system, &**system, p, names, Derivatives::Parameters)
         })
     }
@@ -509,7 +468,7 @@ impl RawSystem {
                 let open = self.open_with(self.kept(&kept, theta)?, theta, look);
                 open.ok_or_else(|| bad("the system is closed"))
             };
-            return self.along_parameters(along, &build, &mut |system| {
+            return self.along_parameters(along, &build, &|system| {
                 asked.gradient(system, &**system, p, names, weigh)
             });
         }
@@ -519,7 +478,7 @@ impl RawSystem {
         }
         let kept = Beside::default();
         let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
-        self.along_parameters(along, &build, &mut |system| {
+        self.along_parameters(along, &build, &|system| {
             asked.gradient(system, &**system, p, names, weigh)
         })
     }
@@ -529,14 +488,18 @@ impl RawSystem {
         &self,
         along: &Along,
         build: &dyn Fn(&[f64]) -> PyResult<F>,
-        work: &mut dyn FnMut(&SystemAt<'_, F>) -> PyResult<T>,
+        work: &dyn Fn(&SystemAt<'_, F>) -> PyResult<T>,
     ) -> PyResult<T> {
-        let mut done = None;
-        with_parameters(along, &self.theta, build, &mut |system| {
-            done = Some(work(system)?);
-            Ok(())
-        })?;
-        done.ok_or_else(|| bad("the work was not done"))
+        let Along { places, sizes, names } = along;
+        // A parameter is its size, displaced by as much as the true one: so zero has a size too.
+        let displaced = |phi: &[f64]| {
+            let mut theta = self.theta.to_vec();
+            for ((&place, phi), size) in places.iter().zip(phi).zip(sizes) {
+                theta[place] += phi - size;
+            }
+            build(&theta)
+        };
+        work(&SystemAt::listed(names, sizes, displaced)?)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Errors as exceptions, whose messages speak of what a user of Python has written.
 
-use metriplectic::dynamics::ModelError as Broken;
-use metriplectic::integrators::step::StateSpace;
-use metriplectic::integrators::{RunError as NotRun, TangentError};
+use metriplectic_dynamics::ModelError as Broken;
+use metriplectic_integrators::step::StateSpace;
+use metriplectic_integrators::{RunError as NotRun, TangentError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;

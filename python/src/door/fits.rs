@@ -1,7 +1,7 @@
 //! Least squares, by the solver of the library.
 
 use argmin::core::{Executor, State as _, TerminationReason};
-use metriplectic::fitting::{LeastSquares, LevenbergMarquardt, Squares};
+use metriplectic_fitting::{LeastSquares, LevenbergMarquardt, Squares};
 use nalgebra::{DMatrix, DVector};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

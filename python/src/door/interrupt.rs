@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use metriplectic::equations::{
+use metriplectic_equations::{
     Covectors, Equations, FrictionTerms, Kind, Model, PointError, SecondLaw, Sizes, Terms,
 };
 use pyo3::prelude::*;

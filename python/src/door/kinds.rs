@@ -1,9 +1,9 @@
 //! The kinds of systems: closed ones and open ones, with and without noise.
 
-use metriplectic::dynamics::noise::Uniform;
-use metriplectic::integrators::open::Ledger;
-use metriplectic::integrators::step::StateSpace;
-use metriplectic::integrators::{
+use metriplectic_dynamics::noise::Uniform;
+use metriplectic_integrators::open::Ledger;
+use metriplectic_integrators::step::StateSpace;
+use metriplectic_integrators::{
     Entries, Flow, FromEquations, Listed, Noisy, OpenEquations, OpenState, State,
 };
 

@@ -1,12 +1,12 @@
 //! A method that is chosen by its name.
 
-use metriplectic::integrators::{
+use metriplectic_integrators::{
     Compiled, Control, DormandPrince5, DormandPrince8, Element, Flow, FromEquations, Gauss,
     Gonzalez, ItohAbe, LimitingSites, MeanValue, Memory, MethodError, NoiseSummary, OpenEquations,
     Promises, Radau, Refusal, RestoreError, RungeKuttaChebyshev, Saved, Scheme, StepEnds,
     StepError, StepStart, Stepper, SymmetricItohAbe, Taken,
 };
-use metriplectic::manifolds::{ChartMidpoint, Exponential, WeylMidpoint};
+use metriplectic_manifolds::{ChartMidpoint, Exponential, WeylMidpoint};
 
 use super::interrupt::Interruptible;
 

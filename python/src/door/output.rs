@@ -1,6 +1,6 @@
 //! Runs as arrays.
 
-use metriplectic::integrators::{Certificate, Ending, Event, InvariantBalance, State, Trajectory};
+use metriplectic_integrators::{Certificate, Ending, Event, InvariantBalance, State, Trajectory};
 use numpy::{IntoPyArray, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

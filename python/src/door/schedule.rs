@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use metriplectic::fields::Real;
-use metriplectic::integrators::{Entries, OpenState, Schedule, Span, Until, Watch as _};
+use metriplectic_fields::Real;
+use metriplectic_integrators::{Entries, OpenState, Schedule, Span, Watch as _};
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
 
-use super::errors::{SpanError, bad};
+use super::errors::SpanError;
 use super::interrupt::Look;
 use super::tapes::{Function, tape};
 
@@ -31,13 +31,6 @@ pub(crate) struct Times {
     largest_step: Option<f64>,
     scale: Option<Vec<f64>>,
     absolute: Option<Vec<f64>>,
-}
-
-/// The most directions for which sizes can be given.
-macro_rules! lists {
-    ($then:ident) => {
-        $then!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 18 20 24 27 28 30 32 36 40 48 50 64 100 128 200 256 300)
-    };
 }
 
 impl Times {
@@ -124,29 +117,11 @@ impl Times {
         }
         match (&self.scale, &self.absolute) {
             (None, None) => Ok(until.into()),
-            (Some(sizes), None) => of_list(sizes, until, true),
-            (None, Some(errors)) => of_list(errors, until, false),
+            (Some(sizes), None) => Ok(until.scale_listed(sizes)),
+            (None, Some(errors)) => Ok(until.absolute_listed(errors)),
             (Some(_), Some(_)) => Err(SpanError::new_err("give `scale=` or `absolute=`, not both")),
         }
     }
-}
-
-/// Gives the sizes or the errors of the entries.
-fn of_list(numbers: &[f64], until: Until, is_scale: bool) -> PyResult<Schedule> {
-    macro_rules! by_length {
-        ($($n:literal)*) => {
-            match numbers.len() {
-                $($n => {
-                    let list: [f64; $n] = numbers.try_into().map_err(|_| bad("a list of numbers"))?;
-                    Ok(if is_scale { until.scale(list).into() } else { until.absolute(list).into() })
-                })*
-                n => Err(SpanError::new_err(format!(
-                    "`scale=` and `absolute=` take up to 16 numbers, and some larger lengths, not {n}"
-                ))),
-            }
-        };
-    }
-    lists!(by_length)
 }
 
 /// An event as Python says it.

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use metriplectic::dynamics::exchange::Temperature;
-use metriplectic::integrators::FromEquations;
-use metriplectic::recording::Tape;
+use metriplectic_dynamics::exchange::Temperature;
+use metriplectic_integrators::FromEquations;
+use metriplectic_recording::Tape;
 use pyo3::prelude::*;
 
 use super::errors::bad;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use metriplectic::dynamics::ModelError as Broken;
-use metriplectic::dynamics::noise::{Boltzmann, Uniform};
-use metriplectic::equations::{FrictionTerms, Report};
-use metriplectic::integrators::{
+use metriplectic_dynamics::ModelError as Broken;
+use metriplectic_dynamics::noise::{Boltzmann, Uniform};
+use metriplectic_equations::{FrictionTerms, Report};
+use metriplectic_integrators::{
     FromEquations, Method as _, NinomiyaVictoir, Noisy, RandomFlow, RunError as NotRun, Sampler,
     Schedule, Stepper,
 };
@@ -111,7 +111,7 @@ fn run<F: Kind, M: Stepper<F>>(
 ) -> Result<Output, Failed> {
     let x0 = flow.at_start(&request.start).map_err(|error| of_model(&Broken::Start(error)));
     let x0 = x0.map_err(|error| Failed { error, partial: None })?;
-    type PointOf<F> = metriplectic::integrators::Element<F>;
+    type PointOf<F> = metriplectic_integrators::Element<F>;
     let schedule = request.schedule.clone();
     let schedule = watching::<PointOf<F>>(schedule, &request.events, Derivatives::None);
     let schedule = noting::<PointOf<F>>(schedule, &request.look);
@@ -484,7 +484,7 @@ impl RawSystem {
         let look = Look::new(None);
         let closed = self.closed(&self.theta, &look)?;
         let refused = |error| of_model(&Broken::Start(error));
-        let x0 = metriplectic::integrators::Flow::element(&closed, start).map_err(refused)?;
+        let x0 = metriplectic_integrators::Flow::element(&closed, start).map_err(refused)?;
         match self.open(&self.theta, &look)? {
             None => Ok(closed.report(&x0)),
             Some(open) => {

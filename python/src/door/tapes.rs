@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use metriplectic::recording::Tape;
+use metriplectic_recording::Tape;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use metriplectic::fields::Scalar;
+use metriplectic_fields::Scalar;
 
 use super::errors::TraceError;
 

@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
-use metriplectic::manifolds::lie_algebra::{AlgebraError, StructureConstant};
+use metriplectic_manifolds::lie_algebra::{AlgebraError, StructureConstant};
 
 use super::error::DefinitionError;
 
 /// Checks that constants are finite and antisymmetric and satisfy the Jacobi identity, and leaves out those that are zero. The tolerance
-/// is that of [`metriplectic::manifolds::LieAlgebra::new`].
+/// is that of [`metriplectic_manifolds::LieAlgebra::new`].
 ///
 /// # Errors
 ///
@@ -79,7 +79,7 @@ pub(super) fn checked(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metriplectic::manifolds::LieDual;
+    use metriplectic_manifolds::LieDual;
 
     #[test]
     fn constants_are_judged_as_those_of_the_library() {

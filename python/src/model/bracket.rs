@@ -4,15 +4,15 @@ use std::fmt::Debug;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metriplectic::dynamics::bracket::AreaForm;
-use metriplectic::dynamics::{InNumbers, Metriplectic, Symplectic, System};
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{Covectors, Jet, MetricError, Model as _, Part};
-use metriplectic::fields::Real;
-use metriplectic::manifolds::lie_algebra::StructureConstant;
-use metriplectic::manifolds::{Euclidean, Product, Rotations, Sphere};
-use metriplectic::nalgebra::{Matrix3, Vector1, Vector2, Vector3};
-use metriplectic::recording::{Tape, TapeError};
+use metriplectic_dynamics::bracket::AreaForm;
+use metriplectic_dynamics::{InNumbers, Metriplectic, Symplectic, System};
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{Covectors, Jet, MetricError, Model as _, Part};
+use metriplectic_fields::Real;
+use metriplectic_manifolds::lie_algebra::StructureConstant;
+use metriplectic_manifolds::{Euclidean, Product, Rotations, Sphere};
+use metriplectic_recording::{Tape, TapeError};
+use nalgebra::{Matrix3, Vector1, Vector2, Vector3};
 
 use super::definition::Bracket;
 use super::error::DefinitionError;

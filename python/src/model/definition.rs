@@ -1,7 +1,7 @@
 //! The definition of a system: a space and tapes.
 
-use metriplectic::equations::Kind;
-use metriplectic::recording::Tape;
+use metriplectic_equations::Kind;
+use metriplectic_recording::Tape;
 
 use super::error::DefinitionError;
 use super::space::Space;

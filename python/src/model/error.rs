@@ -1,7 +1,7 @@
 //! Definitions that make no system.
 
-use metriplectic::manifolds::AlgebraError;
-use metriplectic::recording::TapeError;
+use metriplectic_manifolds::AlgebraError;
+use metriplectic_recording::TapeError;
 
 /// A definition that makes no system.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

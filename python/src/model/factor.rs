@@ -2,15 +2,15 @@
 
 use std::fmt::Debug;
 
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{MetricError, Path, PathAt, PathSlopes, Paths, PointError};
-use metriplectic::fields::{
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{MetricError, Path, PathAt, PathSlopes, Paths, PointError};
+use metriplectic_fields::{
     ChartPoint, Column as _, Dimension as _, Factors as _, Matrix, Real, Square as _, Vector,
     Velocity,
 };
-use metriplectic::manifolds::in_numbers::{PathsInNumbers, column, point, put, put_matrix, write};
-use metriplectic::manifolds::{Canonical, Manifold, Riemannian};
-use metriplectic::recording::PointEntries;
+use metriplectic_manifolds::in_numbers::{PathsInNumbers, column, point, put, put_matrix, write};
+use metriplectic_manifolds::{Canonical, Manifold, Riemannian};
+use metriplectic_recording::PointEntries;
 
 /// A factor of a space, in plain numbers. Its metric is the canonical one, in which the frame of each chart is orthonormal.
 ///

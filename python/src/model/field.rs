@@ -1,9 +1,9 @@
 //! Recorded tensors: matrices on velocities, in the frames of the charts of a space.
 
-use metriplectic::equations::MetricError;
-use metriplectic::equations::room::with_numbers;
-use metriplectic::fields::Real;
-use metriplectic::recording::{Tape, TapeError};
+use metriplectic_equations::MetricError;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_fields::Real;
+use metriplectic_recording::{Tape, TapeError};
 
 use super::reals::with_reals;
 use super::space::{Layout, Placed};

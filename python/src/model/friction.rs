@@ -1,8 +1,8 @@
 //! Frictions `K_w(x)` that annihilate the covector `w` of the energy.
 
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{Jet, MetricError, Terms};
-use metriplectic::recording::TapeError;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{Jet, MetricError, Terms};
+use metriplectic_recording::TapeError;
 
 use super::definition::{self, Friction};
 use super::error::DefinitionError;

@@ -1,7 +1,7 @@
 //! Energy, entropy and further invariants: scalar functions of a state, with exact derivatives in the charts of a space.
 
-use metriplectic::equations::room::with_numbers;
-use metriplectic::fields::Real;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_fields::Real;
 
 use super::reals::with_reals;
 use super::space::Layout;

@@ -1,8 +1,8 @@
 //! The charts of a space: those of its factors, side by side.
 
-use metriplectic::equations::PointError;
-use metriplectic::equations::room::with_numbers;
-use metriplectic::fields::Real;
+use metriplectic_equations::PointError;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_fields::Real;
 
 use super::factor::frame_seen_from;
 use super::reals::with_reals;

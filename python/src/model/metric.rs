@@ -2,9 +2,9 @@
 
 use std::ops::{Index, IndexMut};
 
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{MetricError, NotPositive};
-use metriplectic::fields::triangular;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{MetricError, NotPositive};
+use metriplectic_fields::triangular;
 
 use super::reals::with_reals;
 use super::tapes::OfState;

@@ -1,7 +1,7 @@
-//! Projections off covectors, one after another, as those of `metriplectic::dynamics::orthogonal` for a number of
+//! Projections off covectors, one after another, as those of `metriplectic_dynamics::orthogonal` for a number of
 //! directions that is known at run time.
 
-use metriplectic::equations::room::with_numbers;
+use metriplectic_equations::room::with_numbers;
 
 use super::metric::Inner;
 
@@ -90,5 +90,5 @@ impl<'a> Normals<'a> {
 
 /// Computes `|v|` without overflow.
 fn magnitude(v: &[f64]) -> f64 {
-    metriplectic::fields::length(v)
+    metriplectic_fields::length(v)
 }

@@ -1,7 +1,7 @@
 //! The paths of steps: those of the factors, side by side.
 
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{MetricError, Path, PathAt, PathSlopes, Paths};
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{MetricError, Path, PathAt, PathSlopes, Paths};
 
 use super::friction::Around;
 use super::layout::put_block;

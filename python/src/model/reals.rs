@@ -1,6 +1,6 @@
 //! Room for numbers with derivatives.
 
-use metriplectic::fields::Real;
+use metriplectic_fields::Real;
 
 /// Calls `f` with so many zeros, without an allocation where they are few.
 pub(super) fn with_reals<T>(count: usize, f: impl FnOnce(&mut [Real]) -> T) -> T {

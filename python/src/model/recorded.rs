@@ -3,14 +3,14 @@
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic::equations::judge::coordinate_scales;
-use metriplectic::equations::room::with_numbers;
-use metriplectic::equations::{
+use metriplectic_equations::judge::coordinate_scales;
+use metriplectic_equations::room::with_numbers;
+use metriplectic_equations::{
     Covectors, ENERGY, ENTROPY, Equations, FrictionTerms, Jet, Kind, MetricError, Model, Part,
     Paths, PointError, SecondLaw, Sizes, Terms,
 };
-use metriplectic::fields::Real;
-use metriplectic::recording::Tape;
+use metriplectic_fields::Real;
+use metriplectic_recording::Tape;
 
 use super::bracket::Poisson;
 use super::definition::{self, Definition};

@@ -4,8 +4,8 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metriplectic::manifolds::lie_algebra::{AlgebraError, StructureConstant};
-use metriplectic::manifolds::{HalfLine, LieDual, Rotations, Sphere};
+use metriplectic_manifolds::lie_algebra::{AlgebraError, StructureConstant};
+use metriplectic_manifolds::{HalfLine, LieDual, Rotations, Sphere};
 
 use super::error::DefinitionError;
 use super::factor::{Factor, Flat, Typed};

@@ -1,6 +1,6 @@
 //! Tapes with the values of their parameters in them, and the products of matrices with covectors.
 
-use metriplectic::recording::{Op, Tape, TapeError};
+use metriplectic_recording::{Op, Tape, TapeError};
 
 /// Where an input of a tape comes from.
 #[derive(Clone, Copy, Debug)]
@@ -182,7 +182,7 @@ pub(super) fn product(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metriplectic::recording::record;
+    use metriplectic_recording::record;
 
     #[test]
     fn a_tape_that_reads_a_number_in_a_choice_alone_depends_on_it() {

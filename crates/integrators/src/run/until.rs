@@ -91,6 +91,18 @@ impl Until {
         self.with(Entries::Absolute(errors))
     }
 
+    /// The run with these [sizes](Self::scale), whose number is known when the program runs.
+    #[must_use]
+    pub fn scale_listed(self, sizes: &[f64]) -> Schedule {
+        Schedule::of(self, Entries::Scale(sizes.into()))
+    }
+
+    /// The run with these [errors](Self::absolute), whose number is known when the program runs.
+    #[must_use]
+    pub fn absolute_listed(self, errors: &[f64]) -> Schedule {
+        Schedule::of(self, Entries::Absolute(errors.into()))
+    }
+
     const fn with<const N: usize>(self, entries: Entries<[f64; N]>) -> Until<N> {
         let Self {
             start, end, tolerance, first, least, largest, every, most, rest, backward, ..
@@ -185,20 +197,18 @@ impl<const N: usize> Until<N> {
 
 impl<const N: usize> From<Until<N>> for Schedule {
     fn from(until: Until<N>) -> Self {
+        let listed = |_, numbers: &[f64; N]| Ok::<_, Infallible>((*numbers).into());
+        let Ok(entries) = until.entries.convert(listed);
+        Self::of(until, entries)
+    }
+}
+
+impl Schedule {
+    /// The run to a time with what its errors are relative to.
+    fn of<const N: usize>(until: Until<N>, entries: Entries<Box<[f64]>>) -> Self {
         let Until {
-            start,
-            end,
-            tolerance,
-            first,
-            least,
-            largest,
-            every,
-            most,
-            rest,
-            backward,
-            entries,
+            start, end, tolerance, first, least, largest, every, most, rest, backward, ..
         } = until;
-        let Ok(entries) = entries.convert(|_, numbers| Ok::<_, Infallible>((*numbers).into()));
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
         let (watch, corners, frozen) = (Requests::default(), Corners::default(), Frozen::No);
         Self { size, start, backward, count: None, every, most, rest, watch, corners, frozen }

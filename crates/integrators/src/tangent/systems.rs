@@ -117,6 +117,30 @@ impl<'a, S> SystemAt<'a, S> {
         Self { system, names, values: theta.as_slice().to_vec(), beside: Box::new(beside) }
     }
 
+    /// Builds the system at values of parameters whose number is known when the program runs, as [`Systems::at`] does.
+    ///
+    /// # Errors
+    ///
+    /// The error of the closure.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one name for each value.
+    pub fn listed<E>(
+        names: &'a [&'static str],
+        values: &[f64],
+        build: impl Fn(&[f64]) -> Result<S, E> + 'a,
+    ) -> Result<Self, E> {
+        assert_eq!(names.len(), values.len(), "a name is expected for each parameter");
+        let (system, values) = (build(values)?, values.to_vec());
+        let theta = values.clone();
+        let beside = move |by: &[f64]| {
+            let theta: Vec<f64> = theta.iter().zip(by).map(|(value, by)| value + by).collect();
+            build(&theta).map_err(drop)
+        };
+        Ok(Self { system, names, values, beside: Box::new(beside) })
+    }
+
     /// Returns the system without its parameters.
     pub fn into_system(self) -> S {
         self.system

@@ -1,7 +1,7 @@
 //! The laws of [`Equations`], [`Model`] and [`Paths`] for each space, bracket and friction.
 
-use metriplectic::equations::{Equations as _, Kind, Path, laws};
-use metriplectic::recording::{Recorded as Number, Tape, record};
+use metriplectic_equations::{Equations as _, Kind, Path, laws};
+use metriplectic_recording::{Recorded as Number, Tape, record};
 use num_dual::DualNum as _;
 
 use crate::model::{Bracket, Definition, Friction, Recorded, Space};
@@ -52,7 +52,7 @@ fn spaces() -> Vec<(Space, Vec<f64>)> {
         x.into_iter().map(|x| x / norm).collect::<Vec<_>>()
     };
     let attitude = || {
-        let rotation = metriplectic::manifolds::rotations::exp(&nalgebra::vector![0.3, -0.7, 0.5]);
+        let rotation = metriplectic_manifolds::rotations::exp(&nalgebra::vector![0.3, -0.7, 0.5]);
         rotation.transpose().iter().copied().collect::<Vec<f64>>()
     };
     let momentum = vec![0.4, -1.1, 0.7];

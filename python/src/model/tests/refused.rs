@@ -1,12 +1,12 @@
 //! Definitions and models that are refused, with the reason.
 
-use metriplectic::dynamics::{Boltzmann, ModelError};
-use metriplectic::equations::{Equations as _, Kind};
-use metriplectic::integrators::{
+use metriplectic_dynamics::{Boltzmann, ModelError};
+use metriplectic_equations::{Equations as _, Kind};
+use metriplectic_integrators::{
     DormandPrince5, DormandPrince8, FromEquations, Method as _, RandomFlow, RunError, Span,
 };
-use metriplectic::manifolds::WeylMidpoint;
-use metriplectic::recording::Recorded as Number;
+use metriplectic_manifolds::WeylMidpoint;
+use metriplectic_recording::Recorded as Number;
 use num_dual::DualNum as _;
 
 use super::laws::tape;

@@ -1,21 +1,21 @@
 //! Runs of systems of tapes beside those of the same systems in the types of the library.
 
-use metriplectic::dynamics::FieldDissipation;
-use metriplectic::dynamics::bracket::{AreaForm, Zero};
-use metriplectic::dynamics::exchange::Contact;
-use metriplectic::dynamics::system::Point;
-use metriplectic::dynamics::{
+use metriplectic_dynamics::FieldDissipation;
+use metriplectic_dynamics::bracket::{AreaForm, Zero};
+use metriplectic_dynamics::exchange::Contact;
+use metriplectic_dynamics::system::Point;
+use metriplectic_dynamics::{
     InNumbers, Metriplectic, OnsagerDissipation, Poisson, Symplectic, System,
 };
-use metriplectic::equations::{Covectors, Equations as _, Model, Part};
-use metriplectic::fields::Real;
-use metriplectic::integrators::{
+use metriplectic_equations::{Covectors, Equations as _, Model, Part};
+use metriplectic_fields::Real;
+use metriplectic_integrators::{
     DormandPrince5, DormandPrince8, FromEquations, Gauss, Method, Radau, RungeKuttaChebyshev, Span,
 };
-use metriplectic::manifolds::{
+use metriplectic_manifolds::{
     Euclidean, HalfLine, LieDual, Manifold, Product, Rotations, Sphere, WeylMidpoint,
 };
-use metriplectic::recording::Recorded as Number;
+use metriplectic_recording::Recorded as Number;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector1, Vector3, Vector4, Vector6, vector};
 use num_dual::DualNum;
 

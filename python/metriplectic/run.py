@@ -26,6 +26,8 @@ class Certificate:
         S(x_n) − S(x₀) and the least change in a step, in the unit of the entropy.
     entropy_falls : int
         Steps on which the entropy fell by more than its round-off.
+    events : dict
+        How often each event has happened, by its name.
     """
 
     def __init__(self, numbers: Mapping[str, Any]):

@@ -33,8 +33,9 @@ class Event:
         ``g(x)``, or ``g(x, t, ..)`` with the time and parameters by their names.
     direction : int
         1 if it has to rise through zero, −1 if it has to fall, 0 for both.
-    stop : bool
-        Whether the run ends there.
+    stop : bool or int
+        Whether the run ends there, or the number of the event at which it does: 10 for ten revolutions. With ``jump`` it ends before the
+        jump of that number.
     jump : function, optional
         The state behind the event, ``jump(x)`` or ``jump(x, t, ..)``. The change of the energy is work, and heat with ``heat_at``.
     heat_at : float, optional
@@ -47,7 +48,7 @@ class Event:
 
     function: Function
     direction: int = 0
-    stop: bool = False
+    stop: bool | int = False
     jump: Function | None = None
     heat_at: float | None = None
     may_lower_entropy: bool = False
@@ -83,6 +84,13 @@ class Definition:
     metric: Program | None
 
 
+def _number_to_stop_at(name: str, stop: bool | int) -> int:
+    """The number of the event that ends a run; 0 if none does."""
+    if stop is False or (isinstance(stop, (bool, int, np.integer)) and stop >= 1):
+        return int(stop)
+    raise ValueError(f"event {name} has stop = {stop!r}; it is True, False, or the number of the event that ends the run, from 1 on")
+
+
 @dataclass
 class _Event:
     """An event as the extension reads it."""
@@ -90,7 +98,7 @@ class _Event:
     name: str
     function: Program
     direction: int
-    stop: bool
+    stop: int
     jump: Program | None
     heat_at: float | None
     may_lower_entropy: bool
@@ -130,6 +138,7 @@ class _Times:
     largest_step: float | None
     scale: list[float] | None
     absolute: list[float] | None
+    backward: bool
 
 
 class System:
@@ -458,6 +467,7 @@ class System:
         largest_step: float | None = None,
         scale: Any = None,
         absolute: Any = None,
+        backward: bool = False,
         sampler: str | None = None,
         seed: int = 0,
         path: int = 0,
@@ -497,6 +507,8 @@ class System:
             Sizes of steps that follow a tolerance.
         scale, absolute : array, optional
             The sizes of the entries that errors are relative to, or the errors that are allowed; zero is the automatic one.
+        backward : bool
+            Whether the run goes back in time, to an end ``t`` before ``t0``: of a closed system without an entropy.
         sampler, seed, path, three_point
             Of a system with noise: ``"random-flow"`` or ``"ninomiya-victoir"``, its random numbers and their kind.
         progress : bool or function
@@ -517,7 +529,7 @@ class System:
         watched = {name: self._record(f, f"observable {name}", None) for name, f in (observables or {}).items()}  # type: ignore[arg-type]
         chosen, start, times, found = self._asked(**request)
         request["events"] = found
-        end = times.end if times.end is not None else t0 + (h or 0.0) * (steps or 0)
+        end = times.end if times.end is not None else t0 + (-1.0 if backward else 1.0) * (h or 0.0) * (steps or 0)
         with _progress(progress, t0, end) as look:
             try:
                 raw = self._raw.run(chosen, start, times, found, look)
@@ -530,7 +542,7 @@ class System:
     def _asked(
         self, y0, t=None, tol=1e-6, h=None, steps=None, t0=0.0, method="dp8", gradient=None, every=None, at=None, each=None,
         at_most=None, rest=None, events=None, corners=(), sampled=None, first_step=None, least_step=None, largest_step=None,
-        scale=None, absolute=None, sampler=None, seed=0, path=0, three_point=False,
+        scale=None, absolute=None, backward=False, sampler=None, seed=0, path=0, three_point=False,
     ):
         def numbers(values):
             return None if values is None else [float(x) for x in np.asarray(values, dtype=float).ravel()]
@@ -542,7 +554,7 @@ class System:
         times = _Times(
             float(t0), number(t), number(h), None if steps is None else int(steps), float(tol), number(every), numbers(at), each, at_most,
             number(rest), numbers(corners) or [], number(sampled), number(first_step), number(least_step), number(largest_step),
-            numbers(scale), numbers(absolute),
+            numbers(scale), numbers(absolute), bool(backward),
         )
         found = events if isinstance(events, list) else [self._event(name, event) for name, event in (events or {}).items()]
         return chosen, self.space.flat(y0), times, found
@@ -563,7 +575,7 @@ class System:
             entries.__signature__ = inspect.signature(map_)  # type: ignore[attr-defined]
             jump = self._record(entries, f"jump of {name}", (space.entries,))
         return _Event(
-            name, self._record(event.function, f"event {name}"), event.direction, bool(event.stop), jump,
+            name, self._record(event.function, f"event {name}"), event.direction, _number_to_stop_at(name, event.stop), jump,
             None if event.heat_at is None else float(event.heat_at), bool(event.may_lower_entropy),
             None if event.resolution is None else float(event.resolution),
         )

@@ -28,6 +28,18 @@ def test_directions_and_stops():
     assert not [e for e in rising.events if e.name == "top"]
 
 
+def test_a_run_ends_at_the_event_of_a_number():
+    # It meets the wall at 1, 3, 5, …
+    wall = lambda stop: {"wall": mp.Event(lambda x: x[0], -1, jump=lambda x: np.stack([x[0], -x[1]]), stop=stop)}
+    run = ball().run([0.5, 0.0], t=100.0, tol=1e-10, events=wall(4), progress=lambda _: None)
+    assert run.ending == "event" and run.t[-1] == pytest.approx(7.0, abs=1e-8)
+    assert run.certificate.events == {"wall": 4}
+    assert "events:      wall 4 times\n" in str(run.certificate)
+    for number in (-1, 0, 2.5, None):
+        with pytest.raises(ValueError, match="number of the event"):
+            ball().run([0.5, 0.0], t=1.0, events=wall(number))
+
+
 def test_parameters_are_those_of_the_run():
     # It falls to the height c under the gravity g: t = √(2(1 − c)/g).
     system = mp.System(mp.R(2), energy=lambda x, g: 0.5 * x[1] ** 2 + g * x[0], poisson="symplectic", parameters={"g": 1.0, "c": 0.5})

@@ -36,6 +36,18 @@ def test_the_program_of_the_page_keeps_both_laws():
     assert np.allclose(run.y[-1], reference([0.001, -1.0, 0.001], 100.0), atol=1e-6)
 
 
+@pytest.mark.parametrize("method", ["dp8", "midpoint", "gauss2"])
+def test_a_run_back_in_time_comes_to_its_start(method):
+    free = mp.System(mp.so3_dual(), energy=lambda p: 0.5 * np.sum(p * p / INERTIA))
+    there = free.run(START, t=5.0, h=0.1, method=method)
+    back = free.run(there.y[-1], t0=5.0, t=0.0, h=0.1, method=method, backward=True)
+    assert back.t[0] == 5.0 and abs(back.t[-1]) < 1e-14 and np.allclose(back.y[-1], START, atol=1e-12 if method != "dp8" else 1e-6)
+    followed = free.run(there.y[-1], t0=5.0, t=0.0, tol=1e-10, backward=True, every=1.0, progress=lambda _: None)
+    assert np.allclose(followed.t, [5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
+    with pytest.raises(mp.SpanError, match="entropy"):
+        body().run(START, t=-5.0, backward=True, method=method)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_reaches_the_reference(method):
     end = 2.0

@@ -185,7 +185,14 @@ impl Output {
 /// The words and the numbers of a certificate.
 pub(crate) fn written<'py>(py: Python<'py>, of: &Certificate) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
+    let mut of = of.clone();
+    of.event_counts.retain(|event| event.name != PROGRESS);
     dict.set_item("text", of.to_string())?;
+    let counts = PyDict::new(py);
+    for event in &of.event_counts {
+        counts.set_item(&event.name, event.count)?;
+    }
+    dict.set_item("events", counts)?;
     dict.set_item("steps", of.steps)?;
     dict.set_item("rejected", of.rejected)?;
     dict.set_item("keeps_energy", of.keeps_energy())?;

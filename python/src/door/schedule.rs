@@ -31,6 +31,7 @@ pub(crate) struct Times {
     largest_step: Option<f64>,
     scale: Option<Vec<f64>>,
     absolute: Option<Vec<f64>>,
+    backward: bool,
 }
 
 impl Times {
@@ -41,6 +42,9 @@ impl Times {
     /// `SpanError` if the numbers contradict each other. What the library refuses is its error later.
     pub(crate) fn schedule(&self) -> PyResult<Schedule> {
         let mut schedule = self.size()?.starting_at(self.start);
+        if self.backward {
+            schedule = schedule.backward();
+        }
         if let Some(each) = self.each {
             schedule = schedule.every(each);
         }
@@ -69,7 +73,7 @@ impl Times {
         match (self.h, self.steps, self.end) {
             (Some(h), Some(steps), _) => Ok(Span::steps(h, steps).into()),
             (Some(h), None, Some(end)) => {
-                let count = (end - self.start) / h;
+                let count = if self.backward { self.start - end } else { end - self.start } / h;
                 let steps = count.round();
                 // The refusal of a size or an end that makes no sense is that of the library.
                 if !(h > 0.0 && count > 0.0 && count.is_finite()) {
@@ -130,7 +134,8 @@ pub(crate) struct Event<'py> {
     name: String,
     function: Bound<'py, PyAny>,
     direction: i8,
-    stop: bool,
+    /// The number of the event that ends the run; 0 if none does.
+    stop: usize,
     jump: Option<Bound<'py, PyAny>>,
     heat_at: Option<f64>,
     may_lower_entropy: bool,
@@ -143,7 +148,8 @@ pub(crate) struct Watched {
     name: String,
     function: Function,
     direction: i8,
-    stop: bool,
+    /// The number of the event that ends the run; 0 if none does.
+    stop: usize,
     jump: Option<Function>,
     heat_at: Option<f64>,
     may_lower_entropy: bool,
@@ -253,8 +259,8 @@ impl Watched {
         if self.direction < 0 {
             watched = watched.falling();
         }
-        if self.stop {
-            watched = watched.stop();
+        if self.stop > 0 {
+            watched = watched.stop_after(self.stop);
         }
         if let Some(dt) = self.resolution {
             watched = watched.resolution(dt);

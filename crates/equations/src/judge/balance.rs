@@ -117,7 +117,9 @@ fn largest_in_blocks(a: &Table, sizes: &Table) -> Row {
     let mut block: SmallVec<[usize; 8]> = (0..n).collect();
     for (i, j) in pairs(n).filter(|&ij| a[ij] != 0.0) {
         let (kept, joined) = (block[i], block[j]);
-        block.iter_mut().filter(|b| **b == joined).for_each(|b| *b = kept);
+        if kept != joined {
+            block.iter_mut().filter(|b| **b == joined).for_each(|b| *b = kept);
+        }
     }
     let mut largest = zeros(n);
     for (i, j) in pairs(n) {

@@ -107,8 +107,9 @@ impl Derivatives {
             return None;
         }
         let mut levels: Vec<_> = (COARSEST..=FINEST).filter_map(at).collect();
+        let largest = self.largest();
         let compared = |levels: &[Vec<Quotient>]| -> Vec<_> {
-            (0..self.df.len()).map(|i| self.mismatch(i, levels)).collect()
+            (0..self.df.len()).map(|i| self.mismatch(i, levels, largest)).collect()
         };
         let agrees = |found: &Result<Option<Mismatch>, Undecided>| *found == Ok(None);
         if levels.len() < NOISY || !compared(&levels).iter().all(agrees) {
@@ -118,10 +119,15 @@ impl Derivatives {
     }
 
     /// The mismatch of the `i`-th entry with the quotient of the smallest bound.
-    fn mismatch(&self, i: usize, levels: &[Vec<Quotient>]) -> Result<Option<Mismatch>, Undecided> {
+    fn mismatch(
+        &self,
+        i: usize,
+        levels: &[Vec<Quotient>],
+        largest: f64,
+    ) -> Result<Option<Mismatch>, Undecided> {
         let (quotient, bound) = self.best(i, levels)?;
         let derivative = self.df[i];
-        let wrong = (quotient - derivative).abs() > bound + self.rounded(i);
+        let wrong = (quotient - derivative).abs() > bound + self.rounded(i, largest);
         Ok(wrong.then_some(Mismatch { derivative, quotient }))
     }
 
@@ -142,11 +148,12 @@ impl Derivatives {
             f(delta, &mut values)?;
             f(-delta, &mut values)?;
         }
+        let largest = self.largest();
         for i in 0..n {
             let coarse = Quotient::of(deltas[0], values[i], values[i + n])?;
             let fine = Quotient::of(deltas[1], values[i + 2 * n], values[i + 3 * n])?;
             let bound = 8.0 * (fine.slope - coarse.slope).abs() + self.rounding(i, &fine);
-            let agrees = (fine.slope - self.df[i]).abs() <= bound + self.rounded(i);
+            let agrees = (fine.slope - self.df[i]).abs() <= bound + self.rounded(i, largest);
             (agrees && self.is_narrow(i, &fine, bound, NARROW_AT_ONCE)).then_some(())?;
         }
         Some(())
@@ -187,11 +194,15 @@ impl Derivatives {
         (of_values + least) / at.delta
     }
 
-    /// The rounding of a derivative.
-    fn rounded(&self, i: usize) -> f64 {
-        let others = self.df.iter().zip(&self.units).map(|(df, unit)| (df / unit).abs());
-        let largest = others.fold(0.0, f64::max) * self.units[i];
-        self.rounding.itself * self.df[i].abs() + self.rounding.others * largest
+    /// The largest derivative in the units of its entry.
+    fn largest(&self) -> f64 {
+        self.df.iter().zip(&self.units).map(|(df, unit)| (df / unit).abs()).fold(0.0, f64::max)
+    }
+
+    /// The rounding of a derivative beside the [largest](Self::largest) one.
+    fn rounded(&self, i: usize, largest: f64) -> f64 {
+        let others = largest * self.units[i];
+        self.rounding.itself * self.df[i].abs() + self.rounding.others * others
     }
 
     fn is_narrow(&self, i: usize, at: &Quotient, bound: f64, fraction: f64) -> bool {

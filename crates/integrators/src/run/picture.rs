@@ -131,7 +131,7 @@ pub(crate) fn draw(times: &[f64], panels: &[Panel]) -> String {
     svg
 }
 
-/// The commands of a path through points, without those that nobody sees: a point alone is a dot, and a gap is a gap.
+/// The commands of a path through points, without those that nobody sees: a point alone is a cross, and a gap is a gap.
 fn path(points: impl Iterator<Item = Option<(f64, f64)>>) -> String {
     let (mut commands, mut last) = (String::new(), None::<(f64, f64)>);
     let mut points = points.peekable();
@@ -142,7 +142,8 @@ fn path(points: impl Iterator<Item = Option<(f64, f64)>>) -> String {
         };
         let ends = points.peek().is_none_or(Option::is_none);
         let command = match last {
-            None => format!("M{x:.1} {y:.1}h0"),
+            None if ends => format!("M{:.1} {y:.1}h6m-3-3v6", x - 3.0),
+            None => format!("M{x:.1} {y:.1}"),
             Some((a, b)) if ends || f64::max((x - a).abs(), (y - b).abs()) > 0.3 => {
                 format!("L{x:.1} {y:.1}")
             }
@@ -185,11 +186,11 @@ mod tests {
         let svg = draw(&times, &[vec![("a < b".to_owned(), values)], vec![]]);
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         assert!(svg.contains("a &lt; b"));
-        // A line from the first to the second point, and the fourth one as a dot.
+        // A line from the first to the second point, and the fourth one as a cross.
         let line = svg.lines().find(|line| line.contains("1.5\"") && line.contains('L')).unwrap();
         assert_eq!([line.matches('M').count(), line.matches('L').count()], [2, 1], "{line}");
         let of_one = draw(&[0.0], &[vec![("x".to_owned(), vec![4.0])]]);
-        assert!(of_one.contains("h0\""), "{of_one}");
+        assert!(of_one.contains("v6\""), "{of_one}");
         let none = draw(&[f64::NAN], &[vec![("x".to_owned(), vec![f64::NAN])]]);
         assert!(!none.contains("NaN"), "{none}");
     }

@@ -46,8 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .build()?;
 
     let about = "Reactions by mass action: a potential that is not quadratic, as Onsager terms.";
-    let example = Example::new(about, 80, 0.1);
-    let start = vector![3.3, 0.1, 0.1];
+    let example = Example::new(about, 160, 0.05);
+    let start = vector![3.8, 0.1, 0.1];
     let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * example.step_size);
     let span = |k: usize| Span::steps(sizes[k], example.steps << k).at_most(1000);
     let runs = (0..4).map(|k| example.run(&isomers, start, span(k)));

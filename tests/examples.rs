@@ -257,7 +257,7 @@ fn reports_have_the_figures_of_closed_forms() {
         ),
         ("pulled_particle", &[("worst_balance", most(1e-13)), ("standard_error", 0.0..=0.03)]),
         ("reaction_wheels", &[("speed", 0.0..=0.05)]),
-        ("reactions", &[("order", about(2.0, 0.05)), ("dimer_error", most(1e-2))]),
+        ("reactions", &[("order", about(2.0, 0.05)), ("difference_of_rates", most(1e-2))]),
         // Neighbours are off by the square of their distance, some 10⁻³ of 2·10⁻².
         (
             "sensitivity_of_a_top",

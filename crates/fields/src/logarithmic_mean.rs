@@ -93,7 +93,7 @@ mod tests {
                 0.118_053_668_206_187_15,
                 27.890_758_046_296_31,
                 -4_533_334.803_010_915,
-                6_800_002.204_516_374,
+                6_800_002_204.516_374,
             ],
         ),
     ];
@@ -125,7 +125,7 @@ mod tests {
         for (p, q) in
             [(2.0, 1.0), (1.999_999_999_999, 1.0), (2.000_000_000_001, 1.0), (1.0, 1e-290)]
         {
-            let mean = logarithmic_mean(p, q);
+            let mean: f64 = logarithmic_mean(p, q);
             let off = |other: f64| (other - mean).abs() / mean;
             assert!(off(logarithmic_mean(q, p)) <= 4.0 * f64::EPSILON);
             for scale in [2_f64.powi(-40), 2_f64.powi(300)] {
@@ -152,7 +152,7 @@ mod tests {
                 .eps1
                 .is_nan()
         );
-        for [p, q] in [[-1.0, 2.0], [2.0, -1.0], [-1.0, -1.1], [-1.0, -9.0], [0.0, 0.0]] {
+        for [p, q] in [[-1.0_f64, 2.0], [2.0, -1.0], [-1.0, -1.1], [-1.0, -9.0], [0.0, 0.0]] {
             assert!(logarithmic_mean(p, q).is_nan(), "{p}, {q}");
         }
     }

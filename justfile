@@ -177,6 +177,16 @@ precision:
 features: (need "cargo hack --version" "cargo install cargo-hack --locked")
     cargo hack check --workspace --feature-powerset
 
+# check the sets of features that users take: none, the default, each and all; and the default in a browser
+sets:
+    cargo check --package metriplectic --no-default-features
+    cargo check --package metriplectic
+    for feature in argmin ensembles fitting rayon petgraph serde; do \
+        cargo check --package metriplectic --no-default-features --features $feature; \
+    done
+    cargo check --package metriplectic --all-features
+    cargo check --package metriplectic --target wasm32-unknown-unknown
+
 # check with the oldest supported compiler
 msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain install " + msrv + " --profile minimal"))
     cargo +{{ msrv }} check --workspace --all-features

@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             kinetic + (x.z / CAPACITY).exp_m1() * (CAPACITY * ROOM)
         })
         .entropy(|x: &Vector3<Real>| x.z)
-        .dissipation(FieldDissipation(drag))
+        .field_dissipation(drag)
         .build()?;
     let about = "A colloid in a laser trap: fast friction that is damped, and a slow drift.";
     let example = Example::new(about, 200, 2e-5);

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let oscillator = System::on(Euclidean::<3>)
         .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
-        .dissipation(FieldDissipation(friction))
+        .field_dissipation(friction)
         .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z)
         .build()?;

@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let containers = System::on(Euclidean::<4>)
         .bracket(Poisson::field(wall))
-        .dissipation(FieldDissipation(leak))
+        .field_dissipation(leak)
         .energy(|x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w)
         .entropy(|x: &Vector4<Real>| (x.x * (-x.x + 2.0)).ln() + (x.z * x.w).ln() * 1.5);
     let start = Vector4::new(1.0, 2.0, 2.0, 2.0);

@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let pendulum = System::on(Product(Euclidean::<8>, Euclidean::<2>))
         .bracket((Symplectic, Zero))
-        .dissipation(FieldDissipation(conduction))
+        .field_dissipation(conduction)
         .energy(energy)
         .entropy(|(_, s): &Point<Real>| s.x + s.y)
         .momentum(angular_momentum)

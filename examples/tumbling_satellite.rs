@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .momentum(|((r, p), _): &Point| (r * p).x)
         .momentum(|((r, p), _): &Point| (r * p).y)
         .momentum(|((r, p), _): &Point| (r * p).z)
-        .dissipation(FieldDissipation(rubbing))
+        .field_dissipation(rubbing)
         .build()?;
     let p0 = vector![0.15, 0.1, 2.0];
     let start = ((Matrix3::identity(), p0), Vector1::new(0.0));

@@ -70,11 +70,11 @@
 pub mod guide;
 
 pub use metriplectic_dynamics as dynamics;
-#[cfg(feature = "ensembles")]
+#[cfg(all(feature = "ensembles", not(all(target_arch = "wasm32", target_os = "unknown"))))]
 pub use metriplectic_ensembles as ensembles;
 pub use metriplectic_equations as equations;
 pub use metriplectic_fields as fields;
-#[cfg(feature = "fitting")]
+#[cfg(all(feature = "fitting", not(all(target_arch = "wasm32", target_os = "unknown"))))]
 pub use metriplectic_fitting as fitting;
 pub use metriplectic_integrators as integrators;
 pub use metriplectic_lattices as lattices;
@@ -92,13 +92,18 @@ pub mod prelude {
         OnsagerDissipation, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
         VectorField, Verify, Zero,
     };
-    #[cfg(feature = "ensembles")]
+    #[cfg(all(
+        feature = "ensembles",
+        not(all(target_arch = "wasm32", target_os = "unknown"))
+    ))]
     pub use metriplectic_ensembles::{
         Doubling, Estimate, FluctuationTheorem, Row, RowStatus, Shard, Sweep, Table, geomspace,
         linspace,
     };
-    pub use metriplectic_fields::{ErasedField, MatrixField, Piecewise, Real, Scalar, ScalarField};
-    #[cfg(feature = "fitting")]
+    pub use metriplectic_fields::{
+        ErasedField, MatrixField, Piecewise, Real, Scalar, ScalarField, logarithmic_mean,
+    };
+    #[cfg(all(feature = "fitting", not(all(target_arch = "wasm32", target_os = "unknown"))))]
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_integrators::{
         Adjoints, Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8,

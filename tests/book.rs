@@ -20,6 +20,9 @@ struct CompilerMessages;
 #[doc = include_str!("../book/src/manifolds.md")]
 struct Manifolds;
 
+#[doc = include_str!("../book/src/dissipation_potentials.md")]
+struct DissipationPotentials;
+
 #[doc = include_str!("../book/src/methods.md")]
 struct Methods;
 

@@ -136,7 +136,7 @@ enum Entropy {
 use Entropy::*;
 
 /// The examples of one run: bounds of the energy error, relative, and of the distance from the manifold, and what the entropy does.
-const RUNS: [(&str, f64, Entropy, f64); 20] = [
+const RUNS: [(&str, f64, Entropy, f64); 21] = [
     ("chaplygin_sleigh", 5e-15, Missing, 0.0),
     ("colloid", 1e-14, Rises, 0.0),
     ("damped_oscillator", 5e-14, Rises, 0.0),
@@ -148,6 +148,7 @@ const RUNS: [(&str, f64, Entropy, f64); 20] = [
     ("kovalevskaya_top", 5e-15, Missing, 0.0),
     // Its motors bring in most of the energy: a test below has the balance.
     ("reaction_wheels", f64::INFINITY, Rises, 0.0),
+    ("reactions", 5e-15, Rises, 0.0),
     ("relaxing_rigid_body", 5e-15, Rises, 0.0),
     ("rotations", 5e-15, Rises, 4e-15),
     ("sensitivity_of_a_top", 5e-15, Missing, 1e-15),
@@ -225,7 +226,7 @@ type Figure<'a, R = RangeInclusive<f64>> = (&'a str, R);
 fn reports_have_the_figures_of_closed_forms() {
     let about = |value: f64, by: f64| value - by..=value + by;
     let most = |most: f64| -most..=most;
-    let figures: [(&str, &[Figure<'_>]); 16] = [
+    let figures: [(&str, &[Figure<'_>]); 17] = [
         ("chaplygin_sleigh", &[("order", about(2.0, 0.01))]),
         // Of the 102 nm where the drift begins, in closed form.
         ("colloid", &[("apart", most(1e-10)), ("friction", 0.0..=10.0)]),
@@ -256,6 +257,7 @@ fn reports_have_the_figures_of_closed_forms() {
         ),
         ("pulled_particle", &[("worst_balance", most(1e-13)), ("standard_error", 0.0..=0.03)]),
         ("reaction_wheels", &[("speed", 0.0..=0.05)]),
+        ("reactions", &[("order", about(2.0, 0.05)), ("difference_of_rates", most(1e-2))]),
         // Neighbours are off by the square of their distance, some 10⁻³ of 2·10⁻².
         (
             "sensitivity_of_a_top",

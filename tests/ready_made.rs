@@ -1,4 +1,4 @@
-//! The models of `metriplectic::models`: their laws by every method, and closed forms of the motion.
+//! The models of `metriplectic::models`, and reactions by mass action: their laws by every method, and closed forms of the motion.
 
 #[path = "models/methods.rs"]
 mod methods;
@@ -13,6 +13,7 @@ use metriplectic::models::{
     TwoGasContainers,
 };
 use metriplectic::prelude::*;
+use metriplectic_studies::Order;
 
 type Point<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
 
@@ -291,5 +292,159 @@ fn a_start_outside_the_cylinder_is_refused() -> Result<(), Error> {
     assert!(DormandPrince8.run(&piston, start, Span::steps(0.01, 1)).is_err());
     let start = vector![0.3, 0.0, 0.1, 0.0];
     assert!(DormandPrince8.run(&TUBES.system()?, start, Span::steps(1e-4, 1)).is_err());
+    Ok(())
+}
+
+/// A reaction by its rate constant, and how often each of three substances stands on its left and on its right side.
+#[derive(Clone, Copy)]
+struct Reaction {
+    rate: f64,
+    sides: [[i32; 3]; 2],
+}
+
+/// Two reactions of three substances by mass action, with the amounts and the molar energies of an equilibrium.
+#[derive(Clone, Copy)]
+struct Network {
+    reactions: [Reaction; 2],
+    equilibrium: [f64; 3],
+    energies: [f64; 3],
+}
+
+impl Network {
+    /// `A ⇌ B ⇌ C` with these rate constants, and amounts in this unit.
+    const fn isomers(rates: [f64; 2], unit: f64) -> Self {
+        let first = Reaction { rate: rates[0] * unit, sides: [[1, 0, 0], [0, 1, 0]] };
+        let second = Reaction { rate: rates[1] * unit, sides: [[0, 1, 0], [0, 0, 1]] };
+        let equilibrium = [unit, 2.0 * unit, 0.5 * unit];
+        Self { reactions: [first, second], equilibrium, energies: [3e4; 3] }
+    }
+
+    /// `2A ⇌ B`, in two halves, beside a substance that does not react.
+    const fn dimer(unit: f64) -> Self {
+        let half = Reaction { rate: 0.5 * unit, sides: [[2, 0, 0], [0, 1, 0]] };
+        let equilibrium = [unit, 2.0 * unit, unit];
+        Self { reactions: [half; 2], equilibrium, energies: [3e4, 6e4, 3e4] }
+    }
+
+    fn system(
+        self,
+    ) -> Result<impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> + Clone, Error> {
+        let activities =
+            move |n: &Vector3<Real>| Vector3::from_fn(|i, _| n[i] / self.equilibrium[i]);
+        let system = System::on(Euclidean::<3>)
+            .energy(move |n: &Vector3<Real>| n.dot(&Vector3::from(self.energies).cast()))
+            .entropy(move |n: &Vector3<Real>| {
+                n.dot(&activities(n).map(|activity| -activity.ln() + 1.0))
+            })
+            .onsager(move |n: &Vector3<Real>, _: &Vector3<Real>| {
+                let activities = activities(n);
+                self.reactions.map(|Reaction { rate, sides }| {
+                    let [p, q] = sides.map(|side| {
+                        (0..3).fold(Real::from(rate), |p, i| p * activities[i].powi(side[i]))
+                    });
+                    let along = Vector3::from_fn(|i, _| f64::from(sides[1][i] - sides[0][i]));
+                    Contact { rate: logarithmic_mean(p, q), along: along.cast() }
+                })
+            })
+            .build()?;
+        Ok(system)
+    }
+
+    /// The amounts of isomers at a time, by the exponential of the matrix of their linear equations.
+    fn linear(self, start: Vector3<f64>, t: f64) -> Vector3<f64> {
+        let mut generator = Matrix3::<f64>::zeros();
+        for (r, Reaction { rate, .. }) in self.reactions.into_iter().enumerate() {
+            for (from, to) in [(r, r + 1), (r + 1, r)] {
+                let slope = rate / self.equilibrium[from];
+                generator[(from, from)] -= slope;
+                generator[(to, from)] += slope;
+            }
+        }
+        (generator * t).exp() * start
+    }
+}
+
+/// The amount of A in the network of a dimer, from `a₀` with `a + 2b = 1`.
+fn riccati(a: f64, t: f64) -> f64 {
+    let root = (1.0_f64 / 64.0 + 0.25).sqrt();
+    let [above, below] = [root - 0.125, -root - 0.125];
+    let ratio = (a - above) / (a - below) * (-4.0 * root * t).exp();
+    (above - ratio * below) / (1.0 - ratio)
+}
+
+/// In amounts of the order of 1, of a nanomole and of molecules; and with the second reaction a million times faster.
+#[test]
+fn reactions_keep_the_laws_and_follow_mass_action() -> Result<(), Error> {
+    let unequal = vector![3.0, 0.1, 0.2];
+    for unit in [1.0, 1e-9, 1e11] {
+        let isomers = Network::isomers([1.0, 0.4], unit);
+        let system = isomers.system()?;
+        keeps("isomers", &system, &(unequal * unit), (0.01, 100));
+        let states = accurate(&system, unequal * unit, (1e-13, [0.3, 2.0]));
+        for state in &states {
+            let off = (state.point - isomers.linear(unequal * unit, state.time)).amax() / unit;
+            println!("{unit:e}: t = {}: {off:.1e}", state.time);
+            assert!(off < 1e-11, "{unit:e}, t = {}: {off:.1e}", state.time);
+        }
+        let dimer = Network::dimer(unit).system()?;
+        let start = vector![0.98, 0.01, 1.0];
+        keeps("dimer", &dimer, &(start * unit), (0.01, 100));
+        for state in accurate(&dimer, start * unit, (1e-13, [0.3, 2.0])) {
+            let off = state.point.x / unit - riccati(0.98, state.time);
+            assert!(off.abs() < 1e-11, "{unit:e}, t = {}: {off:.1e}", state.time);
+        }
+    }
+    // Radau resolves nothing of the fast reaction: after it, B and C are in equilibrium and A is as in the closed form.
+    let fast = Network::isomers([1.0, 1e6], 1.0);
+    let run = Radau::<2>.run(&fast.system()?, unequal, Span::until(2.0).tolerance(1e-8))?;
+    let certificate = run.certificate();
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+    let off = (run.last().point - fast.linear(unequal, 2.0)).amax();
+    println!("a fast reaction: {off:.1e}");
+    assert!(off < 1e-5, "{off:.1e}");
+    Ok(())
+}
+
+#[test]
+fn the_scheme_has_order_two_on_mass_action() -> Result<(), Box<dyn std::error::Error>> {
+    let sizes = [0.1, 0.05, 0.025, 0.0125];
+    let errors = |network: Network, start: Vector3<f64>, exact: Vector3<f64>| {
+        sizes.map(|h| {
+            let system = network.system().expect("it is built");
+            let run = WeylMidpoint.run(&system, start, Span::steps(h, (1.0 / h).round() as usize));
+            (run.expect("it runs").last().point - exact).amax()
+        })
+    };
+    let isomers = Network::isomers([1.0, 0.4], 1.0);
+    let start = vector![3.0, 0.1, 0.2];
+    let order = Order::fit(&sizes, &errors(isomers, start, isomers.linear(start, 1.0)))?;
+    assert!(order.agrees(2.0, 0.1), "{order:?}");
+    let a = riccati(0.9, 1.0);
+    let [start, end] = [0.9, a].map(|a| vector![a, 0.5 * (1.0 - a), 1.0]);
+    let order = Order::fit(&sizes, &errors(Network::dimer(1.0), start, end))?;
+    assert!(order.agrees(2.0, 0.1), "{order:?}");
+    Ok(())
+}
+
+#[test]
+fn detailed_balance_is_rest_and_no_substance_is_an_error() -> Result<(), Error> {
+    let system = Network::isomers([1.0, 0.4], 1e-3).system()?;
+    for method in Every::all() {
+        let rest = vector![2e-3, 4e-3, 1e-3];
+        let run = method.run(&system, rest, Span::steps(0.1, 20))?;
+        let (c, off) = (run.certificate(), (run.last().point - rest).amax());
+        assert!(c.keeps_energy() && c.keeps_entropy(), "{method:?}: {c}");
+        assert!(off <= 1e-17, "{method:?}: {off:.1e}");
+        // Nearly none of B and C: their affinities are infinite in the limit, and their rates are not.
+        let scarce = vector![1e-3, 1e-12, 1e-14];
+        let run = method.run(&system, scarce, Span::until(1.0))?;
+        let c = run.certificate();
+        assert!(c.keeps_energy() && c.keeps_entropy(), "{method:?}: {c}");
+        for absent in [0.0, -1e-9] {
+            let start = vector![1e-3, absent, 1e-3];
+            let error = method.run(&system, start, Span::steps(0.1, 20)).map(|_| ()).unwrap_err();
+            assert!(error.to_string().contains("the entropy is NaN at"), "{method:?}: {error}");
+        }
+    }
     Ok(())
 }

@@ -56,7 +56,7 @@
 //! | two such forms | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | metriplectic 4-brackets (Morrison and Updike 2024) |
 //! | a form on the Lie algebra | [`CasimirDissipation`](crate::dynamics::CasimirDissipation) | a Casimir grows by forced Euler-Poincaré equations, eq. (ops1) |
 //! | any other force `𝓕(ξ)` on it | [`.force(f)`](crate::dynamics::SystemBuilder::force) | `C' = ⟨𝓕(ξ), [ξ, dC]⟩`, whose sign is verified |
-//! | Onsager's matrix, heat conduction, Stokes friction | [`FieldDissipation`](crate::dynamics::FieldDissipation) | `K(x, w)` with `w` for `dH`: temperatures are components of `w`, and the law is exact; the book's recipes have programs |
+//! | heat conduction, Stokes friction, reactions | [`.onsager(f)`](crate::dynamics::SystemBuilder::onsager), [`.field_dissipation(f)`](crate::dynamics::SystemBuilder::field_dissipation) | `K(x, w)` with `w` for `dH`: temperatures are components of `w`, and the law is exact; the book's recipes have programs |
 //! | a matrix `K(x)` that you do not want to rewrite | [`ProjectedDissipation`](crate::dynamics::ProjectedDissipation) | it is projected orthogonally to `w`, which may spread friction to other variables; the certificate says so |
 //!
 //! # 5. Which retraction?
@@ -164,10 +164,10 @@
 //!     .bracket(Poisson::constant(rows)?)
 //!     .energy(|x: &Vector3<Real>| x.y.powi(2) * 0.5 - x.x.cos() + x.z.exp())
 //!     .entropy(|x: &Vector3<Real>| x.z)
-//!     .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
+//!     .field_dissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
 //!         let b = Vector3::new(Real::from(0.0), w.z, -w.y);
 //!         b * b.transpose() * (w.z.recip() * 0.2)
-//!     }))
+//!     })
 //!     .build()?;
 //! let scheme = Scheme::new(WeylMidpoint).gradient(MeanValue);
 //! let run = scheme.run(&damped, Vector3::new(1.5, 0.0, 0.0), Span::steps(0.1, 200))?;

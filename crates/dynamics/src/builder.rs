@@ -2,11 +2,14 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Real, ScalarField};
+use metriplectic_fields::{Form, Real, ScalarField, Velocity};
 use metriplectic_manifolds::{Canonical, Manifold, Riemannian};
 
 use crate::bracket::{Bracket, NaturalBracket};
-use crate::dissipation::{Choice, Dissipation, Given, NoDissipation};
+use crate::dissipation::{
+    Choice, Dissipation, FieldDissipation, Given, NoDissipation, OnsagerDissipation,
+};
+use crate::exchange::Contact;
 use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
 use crate::metriplectic::SecondLaw;
 use crate::system::{BuildError, Context, Fields, NoEntropy, System, Tensors};
@@ -194,9 +197,34 @@ impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     }
 
     /// Sets the dissipation that produces the entropy, in place of that of the metric: any
-    /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
+    /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation). Closures are shorter by
+    /// [`field_dissipation`](Self::field_dissipation) and [`onsager`](Self::onsager).
     pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L, P> {
         self.choose(|_| Given(dissipation))
+    }
+
+    /// Sets the dissipation by a closure `|x, w| -> K` of the point and of the covector that `K` annihilates: that of
+    /// [`FieldDissipation`]. [`Family`](crate::Family) has this word too, with the parameters as a third argument.
+    pub fn field_dissipation<F>(
+        self,
+        dissipation: F,
+    ) -> SystemBuilder<M, G, B, Given<FieldDissipation<F>>, H, S, L, P>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,
+    {
+        self.dissipation(FieldDissipation(dissipation))
+    }
+
+    /// Sets the dissipation by a closure `|x, w| -> [Contact; R]` that returns its terms of rank one: that of
+    /// [`OnsagerDissipation`]. On a lattice the words are `bond_onsager` and `site_onsager`.
+    pub fn onsager<F, const R: usize>(
+        self,
+        terms: F,
+    ) -> SystemBuilder<M, G, B, Given<OnsagerDissipation<F>>, H, S, L, P>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> [Contact<Velocity<M, Real>>; R],
+    {
+        self.dissipation(OnsagerDissipation(terms))
     }
 
     /// Sets the Riemannian metric: [`Metric::constant`](metriplectic_manifolds::Metric::constant) or

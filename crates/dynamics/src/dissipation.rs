@@ -111,6 +111,11 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     fn is_projected(&self) -> bool {
         false
     }
+
+    /// Returns whether this is the dissipation of the metric with `κ = 1`, which a system with an entropy has by default.
+    fn is_default(&self) -> bool {
+        false
+    }
 }
 
 /// The number of directions up to which the sum over pairs takes no more time than two projections.

@@ -13,6 +13,7 @@
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
 //! | [`newton`] | damped Newton iterations, for unknowns of any kind |
 //! | [`series`] | functions of a small angle, right under dual numbers |
+//! | [`logarithmic_mean`] | the conductance of a reaction by mass action |
 //! | [`stack`] | room on the stack for large matrices |
 //! | [`laws`] | the laws of a field, and the function that checks them |
 //!
@@ -36,6 +37,7 @@ pub mod dimension;
 pub mod erased;
 pub mod field;
 pub mod laws;
+mod logarithmic_mean;
 pub mod newton;
 pub mod piecewise;
 pub mod scalar;
@@ -50,6 +52,7 @@ pub use differential::{differential, hessian, jacobian};
 pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes, seeded};
+pub use logarithmic_mean::logarithmic_mean;
 pub use metriplectic_equations::{BrokenLaw, NotPositive};
 pub use piecewise::Piecewise;
 pub use scalar::{Real, Scalar};

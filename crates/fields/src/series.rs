@@ -91,8 +91,8 @@ pub fn angle_over_sine<D: Scalar>(squared_sine: D, cosine: D) -> D {
     sine.atan2(cosine) / sine
 }
 
-/// `atan(t)/t = Σ_k (−t²)^k/(2k + 1)` for `t² ≤ 1/9`.
-fn arctangent_series<D: Scalar>(squared: D) -> D {
+/// `atan(t)/t = Σ_k (−t²)^k/(2k + 1)` for `|t²| ≤ 1/9`; that of `−t²` is `artanh(t)/t`.
+pub(crate) fn arctangent_series<D: Scalar>(squared: D) -> D {
     let mut sum = D::zero();
     for k in (0..20_u32).rev() {
         sum = -(squared * sum) + f64::from(2 * k + 1).recip();

@@ -21,6 +21,7 @@ pub(crate) mod method;
 pub mod observables;
 mod output;
 pub mod paired;
+mod picture;
 mod plain;
 mod progress;
 mod recheck;

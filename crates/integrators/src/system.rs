@@ -13,7 +13,7 @@ use metriplectic_dynamics::{
     Dissipation, InNumbers, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
-use metriplectic_manifolds::{Manifold, PointError};
+use metriplectic_manifolds::{InnerProduct as _, Manifold, PointError};
 
 use reach::Around;
 pub(crate) use recheck::{NO_CLOCK, recheck};
@@ -117,6 +117,10 @@ impl<Y: Metriplectic> Flow for Y {
 
     fn is_projected(&self) -> bool {
         self.dissipation().is_projected()
+    }
+
+    fn default_friction(&self, x: &Point<Y>) -> Option<f64> {
+        default_friction(self, x)
     }
 
     fn check(&self, x0: &Point<Y>) -> Result<(), ModelError> {
@@ -254,6 +258,17 @@ impl<Y: Metriplectic> Written for Y {
         let values = values.as_ref();
         CountOf::<Y>::array(|k| values[k])
     }
+}
+
+/// The size of the default friction of a system at a point, for [`Flow::default_friction`].
+pub(crate) fn default_friction<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Option<f64> {
+    if !system.dissipation().is_default() {
+        return None;
+    }
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let w = differentials(system, &centre).energy;
+    let w = system.metric_at(&centre).inner().ok()?.orthonormal(&w);
+    Some(w.dot(&w))
 }
 
 /// The further invariants of a system at a point.

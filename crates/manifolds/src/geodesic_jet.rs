@@ -153,7 +153,7 @@ impl<M: Manifold> ArrivalJet<M> {
 /// # Errors
 ///
 /// The errors of [`travel`].
-#[cfg(feature = "argmin")]
+#[cfg(all(feature = "argmin", not(all(target_arch = "wasm32", target_os = "unknown"))))]
 pub(crate) fn follow<M: Manifold>(
     field: &impl MatrixField<M>,
     start: &GeodesicJet<M>,

@@ -61,7 +61,7 @@ pub mod metric_error;
 pub mod moving_base;
 pub mod normal;
 pub mod parametric_metric;
-#[cfg(feature = "argmin")]
+#[cfg(all(feature = "argmin", not(all(target_arch = "wasm32", target_os = "unknown"))))]
 mod path;
 pub mod product;
 pub mod product_metric;

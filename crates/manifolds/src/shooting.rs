@@ -24,7 +24,10 @@ const STAGES: [u32; 3] = [4, 16, 64];
 /// end is moved from `x` to `y` in stages, each shot aimed by the one before.
 pub(crate) fn log<M: Manifold, G: Riemannian<M>>(
     metric: &G,
-    #[cfg_attr(not(feature = "argmin"), allow(unused_variables, reason = "it relaxes paths"))]
+    #[cfg_attr(
+        not(all(feature = "argmin", not(all(target_arch = "wasm32", target_os = "unknown")))),
+        allow(unused_variables, reason = "it relaxes paths")
+    )]
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     y: &M::Point<f64>,
@@ -37,7 +40,7 @@ pub(crate) fn log<M: Manifold, G: Riemannian<M>>(
     let straight = line::<M>(x, y)?;
     let aim = straight * stretch(metric, x, &straight);
     let mut last = hit(y, &aim, EAGER);
-    #[cfg(feature = "argmin")]
+    #[cfg(all(feature = "argmin", not(all(target_arch = "wasm32", target_os = "unknown"))))]
     if last.is_err()
         && let Some(aim) = crate::path::aim(field, x, &straight)
     {

@@ -87,6 +87,10 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     fn adapts(&self) -> bool {
         true
     }
+
+    fn is_default(&self) -> bool {
+        true
+    }
 }
 
 /// `∂(K_w α)/∂z`, which is zero for a constant metric. With `P = ♯w`, `A = ♯α` and

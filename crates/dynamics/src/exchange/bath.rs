@@ -52,8 +52,21 @@ impl<T> Bath<T, ()> {
     }
 
     /// Sets the friction `R = rate · g⁻¹`, with the metric `g` of the system. It acts along every direction: on SO(3) × R³ it turns
-    /// the attitude towards lower energy as it slows the momenta down. A bath that acts on some directions alone has
-    /// [contacts](Self::friction) along these.
+    /// the attitude towards lower energy as it slows the momenta down. A bath of one factor has
+    /// [contacts](Self::friction) along its directions:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::exchange::{Bath, Contact};
+    /// use metriplectic_dynamics::{Metriplectic, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::{Euclidean, Product, Rotations};
+    /// use nalgebra::{Matrix3, Vector3, Vector6};
+    /// # use metriplectic_dynamics::exchange::Exchange;
+    /// // On SO(3) × R³: the isotropic friction of the momenta alone, directions 3 to 5.
+    /// let drag = Bath::at(300.0).friction(|_: Real, _: &(Matrix3<Real>, Vector3<Real>), _: &Vector6<Real>| {
+    ///     [3, 4, 5].map(|k| Contact { rate: 0.1.into(), along: Vector6::ith(k, 1.0.into()) })
+    /// });
+    /// ```
     pub fn isotropic(self, rate: f64) -> Bath<T, Isotropic> {
         Bath { temperature: self.temperature, friction: Isotropic { rate } }
     }

@@ -84,6 +84,10 @@ where
     fn is_projected(&self) -> bool {
         self.0.is_projected()
     }
+
+    fn is_default(&self) -> bool {
+        self.0.is_default()
+    }
 }
 
 /// A dissipation by a closure `|x, w, θ| -> K` that annihilates `w` itself, on `M × Rᴾ`; the counterpart of

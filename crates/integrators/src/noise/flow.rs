@@ -110,6 +110,10 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
         self.flow().is_projected()
     }
 
+    fn default_friction(&self, x: &Element<F>) -> Option<f64> {
+        self.flow().default_friction(x)
+    }
+
     fn check(&self, x0: &Element<F>) -> Result<(), ModelError> {
         if self.has_certificate() {
             self.flow().check_start_alone(x0)

@@ -26,6 +26,9 @@ pub(crate) trait Beside {
     /// [`Flow::is_projected`].
     fn is_projected(&self) -> bool;
 
+    /// [`Flow::default_friction`].
+    fn default_friction(&self, x: &[f64]) -> Option<f64>;
+
     /// [`Flow::energy_sizes`].
     fn energy_sizes(&self, ends: [&[f64]; 2]) -> [f64; 2];
 
@@ -63,6 +66,10 @@ impl<F: Written> Beside for InTypes<'_, F> {
 
     fn is_projected(&self) -> bool {
         self.0.is_projected()
+    }
+
+    fn default_friction(&self, x: &[f64]) -> Option<f64> {
+        self.0.default_friction(&F::read(self.0.layout(), x))
     }
 
     fn energy_sizes(&self, ends: [&[f64]; 2]) -> [f64; 2] {
@@ -157,6 +164,10 @@ impl Flow for Answered<'_> {
 
     fn is_projected(&self) -> bool {
         self.beside.is_projected()
+    }
+
+    fn default_friction(&self, x: &Entries) -> Option<f64> {
+        self.beside.default_friction(x)
     }
 
     fn energy_sizes(&self, [x, y]: [&Entries; 2]) -> [f64; 2] {

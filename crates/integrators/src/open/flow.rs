@@ -23,6 +23,7 @@ use crate::step::{
     LedgerSummary, Listed, Numbers, Recheck, Scales, StartError, StateSpace as _, StepError,
     Values, Vector as _, Written,
 };
+use crate::system::default_friction;
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
 where
@@ -196,6 +197,10 @@ where
 
     fn is_projected(&self) -> bool {
         self.closed().dissipation().is_projected()
+    }
+
+    fn default_friction(&self, x: &StateOf<Y>) -> Option<f64> {
+        default_friction(&self.without_exchange(x.time), &x.x)
     }
 
     fn check(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {

@@ -134,6 +134,14 @@ pub struct Certificate {
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
+    /// The largest eigenvalue `|K| = G*(dH, dH)` of `K` at the start of the run, in units of `κ = 1`, if the friction is
+    /// that of the metric and no scale was chosen; `None` for another one.
+    ///
+    /// A system with an entropy has this friction by default.
+    /// [`MetricDissipation::scaled`](metriplectic_dynamics::MetricDissipation::scaled) scales it, and
+    /// [`NoDissipation`](metriplectic_dynamics::NoDissipation) removes it.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub default_friction: Option<f64>,
 }
 
 /// Steps of a method that projects onto the laws; all are zero for another one.
@@ -342,6 +350,7 @@ impl Certificate {
             exchanged_in_jumps: Exchanged::NOTHING,
             noise: None,
             projected: flow.is_projected(),
+            default_friction: flow.default_friction(x0),
         }
     }
 

@@ -53,9 +53,12 @@ mod npy;
 
 use std::fmt;
 use std::io::{self, Seek, Write};
+use std::path::Path;
 
 use crate::run::event::Event;
+use crate::run::picture::draw;
 use crate::run::state::State;
+use crate::run::trajectory::Trajectory;
 use crate::step::{Flow, HasFlow, StateSpace};
 
 pub use csv::{Csv, quoted};
@@ -218,6 +221,37 @@ impl<'a, M: StateSpace> Observables<'a, M> {
         let mut table = Npy { of: self, to: Some(to), origin, rows: 0, bytes: Vec::new() };
         table.flush()?;
         Ok(table)
+    }
+
+    /// Draws these numbers of the recorded states of a run over the time, on one pair of axes, as an SVG file. A number that is not
+    /// finite leaves a gap.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Observables, Run, Span};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// # let path = std::env::temp_dir().join(format!("metriplectic-of-{}.svg", std::process::id()));
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), Span::steps(0.1, 100))?;
+    /// Observables::on(&body).of("|p|", |p| p.norm()).of("p1", |p| p.x).svg(&run, &path)?;
+    /// # assert!(std::fs::read_to_string(&path)?.contains(">|p|</text>"));
+    /// # std::fs::remove_file(path)?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The errors of writing to the file.
+    pub fn svg(&self, run: &Trajectory<M>, path: impl AsRef<Path>) -> io::Result<()> {
+        let times: Vec<f64> = run.iter().map(|state| state.time).collect();
+        let line = |(name, f): &Observable<'a, M>| (name.clone(), run.iter().map(f).collect());
+        std::fs::write(path, draw(&times, &[self.list.iter().skip(1).map(line).collect()]))
     }
 
     fn check_names(&self) -> Result<(), ObservablesError> {

@@ -7,6 +7,10 @@ use crate::run::sequence::Frozen;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///
+/// A program writes this word alone: [`Span::steps`], or [`Span::until`] for steps that follow a tolerance, and then outputs and events
+/// in the same chain. [`Until`](crate::Until), [`Schedule`] and [`Watched`](crate::Watched) are the types in between, and
+/// [`Watch`](crate::Watch) is the trait of their methods, which the prelude brings in.
+///
 /// ```
 /// use metriplectic_integrators::Span;
 /// // A million steps of which a thousand are recorded.

@@ -5,12 +5,14 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use approx::{AbsDiffEq, RelativeEq};
+use metriplectic_dynamics::SecondLaw;
 
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
 use crate::run::ending::Ending;
 use crate::run::event::Event;
 use crate::run::paired::{Unpaired, paired};
+use crate::run::picture::{COLORS, Panel, draw};
 use crate::run::state::State;
 use crate::step::StateSpace;
 
@@ -132,6 +134,49 @@ impl<M: StateSpace> Trajectory<M> {
             writeln!(file, ",{:?},{:?}", state.energy, state.entropy)?;
         }
         file.flush()
+    }
+
+    /// Draws the recorded states over the time as an SVG file: the entries of the state `x1, x2, …`, the first 14 of them if there
+    /// are more; below them the error `H − H₀` of the energy, and the entropy `S` if there is one.
+    /// [`Observables::svg`](crate::Observables::svg) draws other numbers.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// # let path = std::env::temp_dir().join(format!("metriplectic-{}.svg", std::process::id()));
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), Span::steps(0.1, 100))?;
+    /// run.svg(&path)?;
+    /// # assert!(std::fs::read_to_string(&path)?.ends_with("</svg>\n"));
+    /// # std::fs::remove_file(path)?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The errors of writing to the file.
+    pub fn svg(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let times: Vec<f64> = self.states.iter().map(|state| state.time).collect();
+        let line = |of: &dyn Fn(&State<M>) -> f64| self.states.iter().map(of).collect::<Vec<_>>();
+        let rows: Vec<_> = self.states.iter().map(|state| M::numbers(&state.point)).collect();
+        let drawn = rows[0].len().min(2 * COLORS.len());
+        let entry = |k: usize| (format!("x{}", k + 1), rows.iter().map(|row| row[k]).collect());
+        let start = self.states[0].energy;
+        let mut panels: Vec<Panel> = vec![
+            (0..drawn).map(entry).collect(),
+            vec![("H − H₀".to_owned(), line(&|state| state.energy - start))],
+        ];
+        if self.certificate.second_law != SecondLaw::NoEntropy {
+            panels.push(vec![("S".to_owned(), line(&|state| state.entropy))]);
+        }
+        std::fs::write(path, draw(&times, &panels))
     }
 
     /// The balance of the run, over all of its steps, recorded or not.

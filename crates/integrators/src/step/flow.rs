@@ -347,6 +347,13 @@ pub trait Flow {
         false
     }
 
+    /// The largest eigenvalue `G*(dH, dH)` of the dissipation of the metric at a state, if a system has this dissipation and no
+    /// scale `κ` was chosen for it.
+    fn default_friction(&self, x: &Element<Self>) -> Option<f64> {
+        let _ = x;
+        None
+    }
+
     /// Verifies the model at the start of a run.
     ///
     /// # Errors

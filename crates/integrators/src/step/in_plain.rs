@@ -159,6 +159,10 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
         self.flow.is_projected()
     }
 
+    fn default_friction(&self, x: &Entries) -> Option<f64> {
+        self.flow.default_friction(&self.at(x))
+    }
+
     fn check(&self, x0: &Entries) -> Result<(), ModelError> {
         self.flow.check(&self.at(x0))
     }

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_fields::Matrix;
+
 use super::certificate::Sensitivity;
 use super::columns::Carried;
 use super::differentiated::Differentiated;
@@ -211,6 +214,32 @@ impl<F: Flow> fmt::Debug for TangentRun<F> {
             .field("states", &self.states)
             .field("sensitivity", &self.sensitivity)
             .finish_non_exhaustive()
+    }
+}
+
+impl<Y: Metriplectic> TangentRun<Y> {
+    /// The matrix `∂x/∂x₀` at the end of the run, of the size that the compiler knows: the
+    /// [derivative](TangentState::derivative) of its last state.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Span, Tangents, DormandPrince5};
+    /// # use metriplectic_manifolds::LieDual;
+    /// # use nalgebra::{Vector3, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let run = DormandPrince5.tangent(&body, vector![0.4, 0.5, 0.3], Span::steps(0.1, 20))?;
+    /// let mut v = Vector3::x();
+    /// v = run.derivative() * v;
+    /// assert!(v.norm() > 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn derivative(&self) -> Matrix<Y::Manifold> {
+        self.last().derivative()
     }
 }
 

@@ -4,7 +4,9 @@ use std::fmt;
 use std::ops::Index;
 
 use metriplectic_dynamics::{Differentiable, Metriplectic};
-use metriplectic_fields::{ChartPoint, Column as _, Dimension as _, Space, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column as _, Dimension as _, Matrix, Space, Square as _, Vector,
+};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::Carried;
@@ -80,6 +82,19 @@ impl<F: Flow> TangentState<F> {
         DVector::from_fn(all, |j, _| {
             (0..n).fold(0.0, |sum, i| sum + df[i] * self.carried.t[(i, j)])
         })
+    }
+}
+
+impl<Y: Metriplectic> TangentState<Y> {
+    /// The matrix `∂x/∂x₀` of [`along_start`](Self::along_start), of the size that the compiler knows.
+    pub fn derivative(&self) -> Matrix<Y::Manifold> {
+        Matrix::<Y::Manifold>::from_entries(|i, j| self.carried.t[(i, j)])
+    }
+
+    /// The column of `∂x/∂θ` of a parameter, [`along`](Self::along), of the size that the compiler knows.
+    pub fn derivative_along(&self, parameter: &str) -> Option<Vector<Y::Manifold>> {
+        let column = self.along(parameter)?;
+        Some(Vector::<Y::Manifold>::from_index(|i| column[i]))
     }
 }
 

@@ -52,6 +52,12 @@ impl fmt::Display for Certificate {
             }
             _ => writeln!(f, "second law:  {}", self.entropy_line()),
         }?;
+        if let Some(size) = self.default_friction {
+            writeln!(
+                f,
+                "friction:    of the metric, by default: κ = 1, |K| = |dH|² = {size:.1e} at the start"
+            )?;
+        }
         if self.projected {
             writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
         }

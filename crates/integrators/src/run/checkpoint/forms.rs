@@ -82,6 +82,8 @@ struct CertificateForm {
     #[serde(skip)]
     noise: Option<NoiseSummary>,
     projected: bool,
+    #[serde(default, with = "exact")]
+    default_friction: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]

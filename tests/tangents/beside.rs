@@ -439,7 +439,8 @@ where
     // Runs to 1e-11, and their differences over 1e-3.
     assert!(error < 1e-7, "{name}: {error:e}\n{found:.9}\n{differences:.9}");
     // The costate of each entry of the end, a ledger too, and of a state before the impact, in steps that are taken again.
-    let back = DormandPrince8.adjoint_within(3, flow, x0.clone(), schedule(0.0)).expect("an adjoint");
+    let back =
+        DormandPrince8.adjoint_within(3, flow, x0.clone(), schedule(0.0)).expect("an adjoint");
     assert_eq!(back.states().len(), run.states().len(), "{name}");
     let (all, last) = (run.last().matrix().nrows(), run.states().len() - 1);
     let mut rows = vec![DVector::zeros(all); last + 1];

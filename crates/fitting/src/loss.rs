@@ -179,8 +179,11 @@ impl<Y, X, T, const P: usize> Loss<Y, X, T, P> {
 pub struct LossOver<Y, X, T, M, const P: usize> {
     loss: Loss<Y, X, T, P>,
     method: M,
-    schedule: Box<dyn Fn(&SVector<f64, P>) -> Schedule + Send + Sync>,
+    schedule: Box<AtParameters<P>>,
 }
+
+/// The schedule at values of the parameters.
+type AtParameters<const P: usize> = dyn Fn(&SVector<f64, P>) -> Schedule + Send + Sync;
 
 impl<Y, X, T, M, const P: usize> LossOver<Y, X, T, M, P> {
     /// The schedule at parameters, with outputs at the terms.

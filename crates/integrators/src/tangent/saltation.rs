@@ -51,8 +51,9 @@ where
     let (flow, x, time) = (system.as_flow(), &at.event.state.point, at.event.state.time);
     let (n, all) = (flow.directions(), flow.directions() + system.names().len());
     let instant = |change: f64| Real::new(time, change, 0.0, 0.0);
-    let function =
-        |change: f64, v: &DVector<f64>| (smooth.function)(instant(change), &system.moved_along(x, v));
+    let function = |change: f64, v: &DVector<f64>| {
+        (smooth.function)(instant(change), &system.moved_along(x, v))
+    };
     let unit = |k: usize| DVector::from_fn(all, |i, _| if i == k { 1.0 } else { 0.0 });
     let dg = DVector::from_fn(n, |k, _| function(0.0, &unit(k)).eps1);
     let before = at.velocity.clone().resize_vertically(all, 0.0);
@@ -166,7 +167,11 @@ where
 impl<F: crate::step::Flow> Located<'_, F> {
     /// Refuses derivatives of another map than the one by which the state has jumped, entry by entry in units of the sizes of the run
     /// and of those after the jump.
-    fn same_jump(&self, off: &[[f64; 2]], after: &DVector<f64>) -> Result<(), TangentError<F::Space>> {
+    fn same_jump(
+        &self,
+        off: &[[f64; 2]],
+        after: &DVector<f64>,
+    ) -> Result<(), TangentError<F::Space>> {
         let sizes: Vec<f64> = self.sizes.iter().zip(after).map(|(a, b)| a.max(*b)).collect();
         let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
         // An entry that has been zero has no size of its own.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::beside;
 use super::certificate::Sensitivity;
@@ -63,6 +63,32 @@ pub(super) fn sizes_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
 ) -> DVector<f64> {
     let (ends, reached) = (&scales.sizes, system.units(x));
     DVector::from_fn(system.as_flow().directions(), |i, _| ends.get(i).max(reached[i]))
+}
+
+/// The sizes of all directions after a step of size `h`, which is that of a clock.
+pub(super) fn units_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, _): (&D, &M),
+    x: &Element<FlowOf<D>>,
+    h: f64,
+) -> DVector<f64> {
+    let mut units = system.units(x);
+    if let Some(clock) = system.as_flow().clock() {
+        units[clock] = h.abs();
+    }
+    units
+}
+
+/// The round-off of the laws of a tangent, relative to their terms.
+pub(super) fn rounding<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, method): (&D, &M),
+) -> f64 {
+    if system.takes_steps_beside(method) { beside::rounding() } else { SUMMED }
+}
+
+/// Turns the rows of a tangent to another frame. Those of parameters have none.
+pub(super) fn turn_rows(turn: &DMatrix<f64>, t: &mut DMatrix<f64>) {
+    let turned = turn * t.rows(0, turn.nrows());
+    t.rows_mut(0, turn.nrows()).copy_from(&turned);
 }
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
@@ -250,11 +276,7 @@ where
 
     /// The sizes of all directions after a step of size `h`, which is that of a clock.
     pub(super) fn units(&self, x: &Element<FlowOf<D>>, h: f64) -> DVector<f64> {
-        let mut units = self.system.units(x);
-        if let Some(clock) = self.system.as_flow().clock() {
-            units[clock] = h.abs();
-        }
-        units
+        units_at((self.system, self.steps.method()), x, h)
     }
 
     /// Returns whether two states are the same but for the time and what is booked.
@@ -265,8 +287,7 @@ where
 
     /// The round-off of the laws of the tangent, relative to their terms.
     pub(super) fn rounding(&self) -> f64 {
-        let is_beside = self.system.takes_steps_beside(self.steps.method());
-        if is_beside { beside::rounding() } else { SUMMED }
+        rounding((self.system, self.steps.method()))
     }
 
     /// The state at a fraction of the last step, by a step of that size, with its derivatives.
@@ -291,7 +312,7 @@ where
         event: Event<SpaceOf<D>>,
         theta: f64,
     ) -> Result<TangentEvent<FlowOf<D>>, Unlinearised> {
-        let (flow, n) = (self.steps.flow(), self.steps.flow().directions());
+        let flow = self.steps.flow();
         let (reached, Moved { mut carried, along_h: mut velocity }) = self.part(last, theta)?;
         if velocity.iter().any(|v| v.is_nan()) {
             return Err(Unlinearised::Branch);
@@ -299,8 +320,7 @@ where
         // The state of the output is not that of the step of this size, and may have another frame.
         if let Some(turn) = flow.turn(&reached, &event.state.point) {
             velocity = &turn * velocity;
-            let turned = turn * carried.t.rows(0, n);
-            carried.t.rows_mut(0, n).copy_from(&turned);
+            turn_rows(&turn, &mut carried.t);
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), carried);

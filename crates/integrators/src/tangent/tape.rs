@@ -4,22 +4,23 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::certificate::Sensitivity;
+use super::columns::{Carried, Moved};
 use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
-use super::part::{Again, Ended, Part, memory_before};
-use super::columns::{Carried, Moved};
 use super::event::Located;
+use super::part::{Again, Ended, Part, memory_before};
 use super::pieces::{parts, propagate};
 use super::saltation::{Crossing, crossing};
 use super::smooth::{FlowOf, SmoothFlow, SpaceOf, VectorOf};
-use super::steps::{Jumps, again, sizes_at, smooth_events};
+use super::steps::{Jumps, again, rounding, sizes_at, smooth_events, turn_rows, units_at};
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
+use crate::run::event::Event;
 use crate::run::last_step::LastStep;
 use crate::run::method::Method as _;
-use crate::run::event::Event;
 use crate::run::recording::Numbered;
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
@@ -122,6 +123,9 @@ struct Recorder<'a, D: Differentiated<M>, M: Stepper<FlowOf<D>>> {
 /// A step with the states that the run yields in place of the one at its end.
 type Recorded<F> = (TapedStep<F>, Vec<State<<F as Flow>::Space>>);
 
+/// A step up to the event that ends it.
+type UpTo<F> = (Vec<Part<F>>, End);
+
 impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
     fn segment(&self) -> Segment<VectorOf<D>> {
         let (largest, checkpoint) = (self.largest.clone(), self.steps.checkpoint());
@@ -194,14 +198,15 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
         (last, again): (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
         scales: &Scales<VectorOf<D>>,
         (event, theta): (&Event<SpaceOf<D>>, f64),
-    ) -> Result<(Vec<Part<FlowOf<D>>>, End), TangentError<SpaceOf<D>>> {
+    ) -> Result<UpTo<FlowOf<D>>, TangentError<SpaceOf<D>>> {
         let (system, method) = (self.system, self.steps.method());
         let failed = |cause| TangentError::NotLinearised { time: last.start.time, cause };
         let reached = inside(method, (last, again), theta).map_err(failed)?;
         let Some(smooth) = &self.events[event.index] else { return Ok((reached.parts, End::Stop)) };
-        let ended = Ended::new(&reached.taken, theta * last.h, &reached.memory).with_again(again, last.h);
+        let ended =
+            Ended::new(&reached.taken, theta * last.h, &reached.memory).with_again(again, last.h);
         let here = Carried::start(system.wide_rows(last.start.x));
-        let Moved { along_h: mut velocity, .. } =
+        let Moved { mut carried, along_h: mut velocity } =
             propagate((system, method), &last.start, &ended, &here).map_err(failed)?;
         if velocity.iter().any(|v| v.is_nan()) {
             return Err(failed(Unlinearised::Branch));
@@ -210,7 +215,11 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
         let turn = system.as_flow().turn(&reached.taken.x, x);
         if let Some(turn) = &turn {
             velocity = turn * velocity;
+            turn_rows(turn, &mut carried.t);
         }
+        let (rows, units) = (system.wide_rows(x), units_at((system, method), x, last.h));
+        let rounding = rounding((system, method));
+        Sensitivity::default().enter(&rows, &units, &carried, rounding).map_err(failed)?;
         let sizes = &sizes_at((system, method), scales, x);
         let at = Located { event, velocity: &velocity, sizes };
         let after = event.jump.as_ref().map(|_| &self.steps.state().point);

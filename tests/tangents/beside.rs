@@ -438,6 +438,20 @@ where
     println!("{name}: {error:.1e}, {}", run.sensitivity());
     // Runs to 1e-11, and their differences over 1e-3.
     assert!(error < 1e-7, "{name}: {error:e}\n{found:.9}\n{differences:.9}");
+    // The costate of each entry of the end, a ledger too, and of a state before the impact, in steps that are taken again.
+    let back =
+        DormandPrince8.adjoint_within(3, flow, x0.clone(), schedule(0.0)).expect("an adjoint");
+    assert_eq!(back.states().len(), run.states().len(), "{name}");
+    let (all, last) = (run.last().matrix().nrows(), run.states().len() - 1);
+    let mut rows = vec![DVector::zeros(all); last + 1];
+    (rows[1], rows[last]) = (row(1, all), row(last, all));
+    let forward = [1, last].map(|k| run.states()[k].derivative_of(&rows[k]));
+    let back = back.pull_back(&rows).expect("a gradient");
+    let off = (&forward[0] + &forward[1]).rows(0, all) - back.along_start();
+    // Differences of steps have some ten digits.
+    let off = off.amax() / forward[1].amax();
+    println!("{name}: transposed to {off:.1e}");
+    assert!(off < 1e-8, "{name}: {off:e}");
 }
 
 #[test]

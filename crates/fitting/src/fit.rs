@@ -423,6 +423,66 @@ where
     where
         M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
     {
+        let schedule = schedule.into();
+        self.run_each(method, |_| schedule.clone(), guess)
+    }
+
+    /// Finds the parameters as [`run`](Self::run) does, over a schedule that depends on them: on the restitution of a jump, or on the
+    /// threshold of a switch.
+    ///
+    /// A ball bounces, and its height is measured. The restitution is a parameter of the map of the jump alone:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Family, Symplectic};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_fitting::Fit;
+    /// use metriplectic_integrators::{DormandPrince8, Method, Schedule, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector1, Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Family::on(Euclidean::<2>)
+    ///     .parameters(["restitution"])
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * 0.5 + x.x)
+    ///     .build()?;
+    /// type Wide = (Vector2<Real>, Vector1<Real>);
+    /// let bounces = |e: &Vector1<f64>| -> Schedule {
+    ///     let e = e.x;
+    ///     Span::until(4.0)
+    ///         .tolerance(1e-9)
+    ///         .event("floor", |x: &Vector2<f64>| x.x)
+    ///         .falling()
+    ///         .jump(move |_, x: &Vector2<f64>| vector![x.x, -e * x.y])
+    ///         .differentiable(|_, (x, _): &Wide| x.x, |_, (x, e): &Wide| (vector![x.x, -e.x * x.y], *e))
+    ///         .into()
+    /// };
+    /// let (start, times) = (vector![0.5, 0.0], [1.2, 1.6, 2.0, 2.4, 2.8, 3.2, 3.6, 4.0]);
+    /// let run = DormandPrince8.run(&ball.at(vector![0.8]), start, bounces(&vector![0.8]).output_at(times))?;
+    /// let rows: Vec<_> = run.states()[1..].iter().map(|s| vector![(s.point.x * 1e3).round() / 1e3]).collect();
+    ///
+    /// let fit = Fit::of(&ball)
+    ///     .observe(|x: &Vector2<Real>| vector![x.x])
+    ///     .data(&times, &rows)
+    ///     .start_at(start)
+    ///     .run_each(DormandPrince8, bounces, vector![0.75])?;
+    /// let error = fit.estimates[0].standard_error;
+    /// assert!((fit.parameters[0] - 0.8).abs() < 4.0 * error && error < 1e-3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`FitError`].
+    pub fn run_each<M>(
+        self,
+        method: M,
+        schedule: impl Fn(&SVector<f64, P>) -> Schedule,
+        guess: SVector<f64, P>,
+    ) -> Result<Fitted, FitError>
+    where
+        M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+    {
         self.options.check()?;
         let Self { of: family, observe, start, options } = self;
         let Some(FamilyStart { point: start, is_free }) = start else {
@@ -436,7 +496,7 @@ where
         let model = Model {
             family,
             method,
-            schedule: schedule.into(),
+            schedule: &schedule,
             observe: &observe,
             measured: &measured,
             unknowns: &unknowns,
@@ -513,7 +573,9 @@ where
     {
         let rows = vec![SVector::zeros(); times.len()];
         let options = Options { times: times.to_vec(), rows, ..Options::default() };
-        Self { options, ..self }.runs(method, schedule.into(), theta, |model, _| {
+        let schedule = schedule.into();
+        let schedule = move |_: &SVector<f64, P>| schedule.clone();
+        Self { options, ..self }.runs(method, &schedule, theta, |model, _| {
             let phi: Vec<f64> = theta.iter().copied().collect();
             let Squares { residuals, jacobian } = model.evaluate(&phi).map_err(FitError::Guess)?;
             let observation = |i: usize| Observation {
@@ -541,17 +603,36 @@ where
     where
         M: Clone + Stepper<S>,
     {
+        let schedule = schedule.into();
+        self.run_each(method, |_| schedule.clone(), guess)
+    }
+
+    /// Finds the parameters as [`run`](Self::run) does, over a schedule that depends on them: on the restitution of a jump, or on the
+    /// threshold of a switch.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`run`](Self::run).
+    pub fn run_each<M>(
+        self,
+        method: M,
+        schedule: impl Fn(&SVector<f64, P>) -> Schedule,
+        guess: SVector<f64, P>,
+    ) -> Result<Fitted, FitError>
+    where
+        M: Clone + Stepper<S>,
+    {
         let with = |model: &Observed<'_, B, S, M, F, P, K>, options: Options<K>| {
             options.nearest(model, model.measured, model.unknowns, (guess, 0))
         };
-        self.runs(method, schedule.into(), guess, with)
+        self.runs(method, &schedule, guess, with)
     }
 
     /// Looks at the data, and calls `f` with the runs at unknowns.
     fn runs<M, T>(
         self,
         method: M,
-        schedule: Schedule,
+        schedule: &dyn Fn(&SVector<f64, P>) -> Schedule,
         guess: SVector<f64, P>,
         f: impl FnOnce(&Observed<'_, B, S, M, F, P, K>, Options<K>) -> Result<T, FitError>,
     ) -> Result<T, FitError> {
@@ -571,7 +652,7 @@ where
         let model = Observed {
             systems: &systems,
             method,
-            schedule: &schedule,
+            schedule,
             observe: &observe,
             measured: &measured,
             unknowns: &unknowns,

@@ -159,8 +159,19 @@ impl<Y, X, T, const P: usize> Loss<Y, X, T, P> {
 
     /// Says how runs are taken: by a method over a schedule.
     pub fn over<M>(self, method: M, schedule: impl Into<Schedule>) -> LossOver<Y, X, T, M, P> {
-        let schedule = schedule.into().output_at(self.times.iter().copied());
-        LossOver { loss: self, method, schedule }
+        let schedule = schedule.into();
+        self.over_each(method, move |_| schedule.clone())
+    }
+
+    /// Says how runs are taken: by a method over a schedule that depends on the parameters, as the map of a
+    /// [jump](metriplectic_integrators::Watched::jump) or the threshold of an event. Jumps need
+    /// [derivatives](metriplectic_integrators::Jumping::differentiable) for runs of a family.
+    pub fn over_each<M>(
+        self,
+        method: M,
+        schedule: impl Fn(&SVector<f64, P>) -> Schedule + Send + Sync + 'static,
+    ) -> LossOver<Y, X, T, M, P> {
+        LossOver { loss: self, method, schedule: Box::new(schedule) }
     }
 }
 
@@ -168,7 +179,17 @@ impl<Y, X, T, const P: usize> Loss<Y, X, T, P> {
 pub struct LossOver<Y, X, T, M, const P: usize> {
     loss: Loss<Y, X, T, P>,
     method: M,
-    schedule: Schedule,
+    schedule: Box<AtParameters<P>>,
+}
+
+/// The schedule at values of the parameters.
+type AtParameters<const P: usize> = dyn Fn(&SVector<f64, P>) -> Schedule + Send + Sync;
+
+impl<Y, X, T, M, const P: usize> LossOver<Y, X, T, M, P> {
+    /// The schedule at parameters, with outputs at the terms.
+    fn schedule(&self, theta: &SVector<f64, P>) -> Schedule {
+        (self.schedule)(theta).output_at(self.loss.times.iter().copied())
+    }
 }
 
 impl<Y, X, T, M, const P: usize> fmt::Debug for LossOver<Y, X, T, M, P> {
@@ -201,11 +222,11 @@ where
     M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
 {
     fn evaluate(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
-        let system = self.loss.of.at_parameters(*theta);
+        let (system, schedule) = (self.loss.of.at_parameters(*theta), self.schedule(theta));
         let mut sum = 0.0;
         for (i, start) in self.loss.starts.iter().enumerate() {
             let run = |schedule| self.method.clone().run(&system, start.clone(), schedule);
-            let run = at_rest_too(&self.schedule, run)?;
+            let run = at_rest_too(&schedule, run)?;
             for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
                 let point = &run.states()[index].point;
                 sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(point)).re;
@@ -215,11 +236,11 @@ where
     }
 
     fn differentiate(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
-        let system = self.loss.of.at_parameters(*theta);
+        let (system, schedule) = (self.loss.of.at_parameters(*theta), self.schedule(theta));
         let (mut sum, mut slope) = (0.0, SVector::zeros());
         for (i, start) in self.loss.starts.iter().enumerate() {
             let run = |schedule| self.method.clone().adjoint(&system, start.clone(), schedule);
-            let run = at_rest_too(&self.schedule, run)?;
+            let run = at_rest_too(&schedule, run)?;
             // The terms of each state: at rest the last one has all that are left.
             let mut terms = vec![Vec::new(); run.states().len()];
             for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
@@ -267,7 +288,8 @@ where
     M: Clone + Stepper<S>,
 {
     fn evaluate(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
-        let of_run = |i| at_rest_too(&self.schedule, |schedule| self.of_run(i, theta, schedule));
+        let over = self.schedule(theta);
+        let of_run = |i| at_rest_too(&over, |schedule| self.of_run(i, theta, schedule));
         (0..self.loss.starts.len()).map(of_run).sum()
     }
 
@@ -277,13 +299,15 @@ where
         }
         let (mut sum, mut gradient) = (0.0, SVector::zeros());
         for i in 0..self.loss.starts.len() {
-            let runs = Beside::new(&self.schedule);
-            let here = runs.first(|schedule| self.of_run(i, theta, schedule))?;
+            let runs = Beside::default();
+            let here =
+                runs.first(&self.schedule(theta), |schedule| self.of_run(i, theta, schedule))?;
             for k in 0..P {
                 let beside = sides(theta[k], theta[k].abs()).map(|side| {
                     let mut theta = *theta;
                     theta[k] = side;
-                    let there = runs.next(|schedule| self.of_run(i, &theta, schedule));
+                    let over = self.schedule(&theta);
+                    let there = runs.next(&over, |schedule| self.of_run(i, &theta, schedule));
                     (side, there.map(|value| DVector::from_element(1, value)))
                 });
                 gradient[k] += slope((theta[k], &DVector::from_element(1, here)), beside)?[0];

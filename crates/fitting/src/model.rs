@@ -40,7 +40,7 @@ impl<const K: usize> Measured<K> {
 pub(crate) struct Model<'a, Y: Parametrised<P>, M, F, const P: usize, const K: usize> {
     pub(crate) family: &'a Y,
     pub(crate) method: M,
-    pub(crate) schedule: Schedule,
+    pub(crate) schedule: &'a dyn Fn(&SVector<f64, P>) -> Schedule,
     pub(crate) observe: &'a F,
     pub(crate) measured: &'a Measured<K>,
     pub(crate) unknowns: &'a [Unknown],
@@ -144,11 +144,11 @@ where
     /// The states at the times of the data. If no run goes on at rest, the last one stands for all later times.
     fn states(
         &self,
-        system: &Y::System,
+        (system, theta): (&Y::System, &SVector<f64, P>),
         start: &Point<Y::System>,
     ) -> Result<Vec<TangentState<Y::System>>, Failure> {
         let times = &self.measured.times;
-        let schedule = self.schedule.clone().output_at(times.iter().copied());
+        let schedule = (self.schedule)(theta).output_at(times.iter().copied());
         let run = |schedule| self.method.clone().tangent(system, start.clone(), schedule);
         let run = at_rest_too(&schedule, run)?;
         let indices = run.indices_at(times)?;
@@ -165,7 +165,7 @@ where
     fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure> {
         let (theta, start) = self.placed(phi);
         let system = self.family.at_parameters(theta);
-        let states = self.states(&system, &start)?;
+        let states = self.states((&system, &theta), &start)?;
         let (first, frame) = (self.unknowns.len(), self.frame(phi, &start));
         let all = first + if self.free_start { Self::N } else { 0 };
         let count = self.measured.rows.len() * K;

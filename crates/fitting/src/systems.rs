@@ -20,25 +20,29 @@ use crate::least_squares::{LeastSquares, Squares};
 use crate::model::{Failure, Measured, Residuals, at_rest_too};
 use crate::unknowns::{Unknown, parameters};
 
-/// Runs of one schedule, and those beside it in the same steps.
-pub(crate) struct Beside<'a> {
-    pub(crate) schedule: &'a Schedule,
-    pub(crate) sequence: StepSequence,
+/// A run, and those beside it in the same steps.
+#[derive(Default)]
+pub(crate) struct Beside {
+    sequence: StepSequence,
 }
 
-impl<'a> Beside<'a> {
-    pub(crate) fn new(schedule: &'a Schedule) -> Self {
-        Self { schedule, sequence: StepSequence::default() }
-    }
-
+impl Beside {
     /// The run that chooses the steps.
-    pub(crate) fn first<R, E>(&self, run: impl Fn(Schedule) -> Result<R, E>) -> Result<R, E> {
-        at_rest_too(self.schedule, |schedule| run(schedule.noting(&self.sequence)))
+    pub(crate) fn first<R, E>(
+        &self,
+        schedule: &Schedule,
+        run: impl Fn(Schedule) -> Result<R, E>,
+    ) -> Result<R, E> {
+        at_rest_too(schedule, |schedule| run(schedule.noting(&self.sequence)))
     }
 
     /// A run that takes them.
-    pub(crate) fn next<R, E>(&self, run: impl Fn(Schedule) -> Result<R, E>) -> Result<R, E> {
-        at_rest_too(self.schedule, |schedule| run(schedule.taking(&self.sequence)))
+    pub(crate) fn next<R, E>(
+        &self,
+        schedule: &Schedule,
+        run: impl Fn(Schedule) -> Result<R, E>,
+    ) -> Result<R, E> {
+        at_rest_too(schedule, |schedule| run(schedule.taking(&self.sequence)))
     }
 }
 
@@ -97,7 +101,7 @@ fn slope_on_one_side(
 pub(crate) struct Observed<'a, B, S: Flow, M, F, const P: usize, const K: usize> {
     pub(crate) systems: &'a Systems<B, P>,
     pub(crate) method: M,
-    pub(crate) schedule: &'a Schedule,
+    pub(crate) schedule: &'a dyn Fn(&SVector<f64, P>) -> Schedule,
     pub(crate) observe: &'a F,
     pub(crate) measured: &'a Measured<K>,
     pub(crate) unknowns: &'a [Unknown],
@@ -141,9 +145,12 @@ where
     F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
 {
     fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure> {
-        let schedule = self.schedule.clone().output_at(self.measured.times.iter().copied());
-        let runs = Beside::new(&schedule);
-        let residuals = runs.first(|schedule| self.residuals(phi, schedule))?;
+        let schedule = |phi: &[f64]| {
+            let schedule = (self.schedule)(&parameters(&self.guess, self.unknowns, phi));
+            schedule.output_at(self.measured.times.iter().copied())
+        };
+        let runs = Beside::default();
+        let residuals = runs.first(&schedule(phi), |schedule| self.residuals(phi, schedule))?;
         let mut jacobian = DMatrix::zeros(residuals.len(), phi.len());
         for (j, unknown) in self.unknowns.iter().enumerate() {
             let guess = self.guess[unknown.index];
@@ -152,7 +159,7 @@ where
             let beside = points.map(|side| {
                 let mut phi = phi.to_vec();
                 phi[j] = side;
-                (side, runs.next(|schedule| self.residuals(&phi, schedule)))
+                (side, runs.next(&schedule(&phi), |schedule| self.residuals(&phi, schedule)))
             });
             let is_between = (points[0] - phi[j]) * (points[1] - phi[j]) < 0.0;
             let slope = if is_between { slope } else { slope_on_one_side };

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use crate::run::certificate::EventCount;
 use crate::run::departure::{self, Departure, Seen, Sides};
-use crate::run::jump::{Jump, JumpOn, JumpRequest};
+use crate::run::jump::{Jump, JumpOn, JumpRequest, SmoothEvent};
 use crate::run::looks::{self, Looked};
 use crate::run::root::{Sample, narrow};
 use crate::run::rounding::rounding;
@@ -116,6 +116,8 @@ pub(crate) struct Request {
     /// The type that the points should have, if it is another one than that of the run.
     expected: Option<&'static str>,
     function: Arc<dyn Any + Send + Sync>,
+    /// The [`SmoothEvent`] with its derivatives, if they were given.
+    smooth: Option<Arc<dyn Any + Send + Sync>>,
 }
 
 impl Request {
@@ -136,7 +138,18 @@ impl Request {
             point: type_name::<P>(),
             expected: None,
             function: Arc::new(Function::<P>(Box::new(function))),
+            smooth: None,
         }
+    }
+
+    /// Adds the derivatives.
+    pub(crate) fn differentiate<P: 'static>(&mut self, smooth: SmoothEvent<P>) {
+        self.smooth = Some(Arc::new(smooth));
+    }
+
+    /// The derivatives, if they were given at points of this type.
+    pub(crate) fn smooth<P: 'static>(&self) -> Option<Arc<SmoothEvent<P>>> {
+        Arc::clone(self.smooth.as_ref()?).downcast().ok()
     }
 }
 

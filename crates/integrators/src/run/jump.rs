@@ -86,10 +86,10 @@ type SmoothFunction<P> = dyn Fn(Real, &P) -> Real + Send + Sync;
 /// A state at a time and a state that carry derivatives.
 type SmoothMap<P> = dyn Fn(Real, &P) -> P + Send + Sync;
 
-/// The function of an event and the map of its jump, at numbers that carry derivatives.
-pub(crate) struct SmoothJump<P> {
-    pub(crate) event: Box<SmoothFunction<P>>,
-    pub(crate) map: Box<SmoothMap<P>>,
+/// The function of an event and the map of its jump, if there is one, at numbers that carry derivatives.
+pub(crate) struct SmoothEvent<P> {
+    pub(crate) function: Box<SmoothFunction<P>>,
+    pub(crate) map: Option<Box<SmoothMap<P>>>,
 }
 
 /// A jump that was asked for.
@@ -99,8 +99,6 @@ pub(crate) struct JumpRequest {
     /// The type that the points should have, if it is another one than that of the run.
     expected: Option<&'static str>,
     function: Arc<dyn Any + Send + Sync>,
-    /// The [`SmoothJump`] with its derivatives, if they were given.
-    smooth: Option<Arc<dyn Any + Send + Sync>>,
     /// The temperature of the surroundings that give the energy as heat.
     pub(crate) temperature: Option<f64>,
     /// Whether the entropy of the system and its surroundings may fall.
@@ -112,17 +110,7 @@ impl JumpRequest {
         let function = Arc::new(Function::<P>(Box::new(map)));
         let point = type_name::<P>();
         let expected = None;
-        Self { point, expected, function, smooth: None, temperature: None, lowers: false }
-    }
-
-    /// Adds the derivatives.
-    pub(crate) fn differentiate<P: 'static>(&mut self, smooth: SmoothJump<P>) {
-        self.smooth = Some(Arc::new(smooth));
-    }
-
-    /// The derivatives, if they were given at points of this type.
-    pub(crate) fn smooth<P: 'static>(&self) -> Option<Arc<SmoothJump<P>>> {
-        Arc::clone(self.smooth.as_ref()?).downcast().ok()
+        Self { point, expected, function, temperature: None, lowers: false }
     }
 
     /// Compares the maps by identity, and the options.
@@ -147,7 +135,7 @@ impl JumpRequest {
             write(&led(&x, (map.0)(time, &x)))
         };
         let function = Arc::new(Function::<Entries>(Box::new(map)));
-        Self { expected, function, smooth: None, ..*self }
+        Self { expected, function, ..*self }
     }
 
     /// Translates a jump of states in plain numbers to those of a flow.
@@ -161,7 +149,7 @@ impl JumpRequest {
         let write = F::write as fn(&Element<F>) -> Entries;
         let map = move |time: f64, x: &Element<F>| read(&layout, &(map.0)(time, &write(x)));
         let function = Arc::new(Function::<Element<F>>(Box::new(map)));
-        Self { expected, function, smooth: None, ..*self }
+        Self { expected, function, ..*self }
     }
 
     /// The jump on the states of a run.

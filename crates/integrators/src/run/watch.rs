@@ -3,7 +3,7 @@
 use crate::run::event::Request;
 use metriplectic_fields::Real;
 
-use crate::run::jump::{JumpRequest, SmoothJump};
+use crate::run::jump::{JumpRequest, SmoothEvent};
 use crate::run::schedule::Schedule;
 
 /// Asks a run for states at given times and for events, whatever its steps are: the steps stay the same, to the
@@ -427,6 +427,48 @@ impl Watched {
     pub fn stop_after(self, n: usize) -> Self {
         self.with(|request| request.stops_after = Some(n))
     }
+
+    /// Gives the function of the event at numbers that carry derivatives, for [gradients](crate::Adjoints) of runs that
+    /// [end](Self::stop) there: with the function `g`, the end `x(t*)` depends on the start by its time too,
+    /// `δt* = −dg δx/(dg v + ∂_t g)`. Say the type of the point in the closure. The point of a family is the pair of the state and the
+    /// parameters. For an event with a jump see [`Jumping::differentiable`].
+    ///
+    /// A stone falls, and hits the ground after `t* = √(2q/g)`:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Family, Symplectic};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{Adjoints, DormandPrince8, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector1, Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let stone = Family::on(Euclidean::<2>)
+    ///     .parameters(["gravity"])
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>, g: &Vector1<Real>| x.y * x.y * 0.5 + x.x * g.x)
+    ///     .build()?;
+    /// type Wide = (Vector2<Real>, Vector1<Real>);
+    /// let span = Span::until(5.0)
+    ///     .tolerance(1e-10)
+    ///     .event("ground", |x: &Vector2<f64>| x.x)
+    ///     .stop()
+    ///     .differentiable(|_, (x, _): &Wide| x.x);
+    /// let system = stone.at(vector![2.0]);
+    /// let run = DormandPrince8.adjoint(&system, vector![4.0, 0.0], span)?;
+    /// let end = run.gradient_of_end()?;
+    /// assert!((end.value - 2.0).abs() < 1e-9); // ∂t*/∂q = t*/2q, ∂t*/∂g = −t*/2g
+    /// assert!((end.along_start()[0] - 0.25).abs() < 1e-9);
+    /// assert!((end.along("gravity").unwrap() + 0.5).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn differentiable<P: 'static>(
+        self,
+        event: impl Fn(Real, &P) -> Real + Send + Sync + 'static,
+    ) -> Self {
+        let smooth = SmoothEvent { function: Box::new(event), map: None };
+        self.with(|request| request.differentiate(smooth))
+    }
 }
 
 impl Watched {
@@ -555,8 +597,8 @@ impl Jumping {
         event: impl Fn(Real, &P) -> Real + Send + Sync + 'static,
         map: impl Fn(Real, &P) -> P + Send + Sync + 'static,
     ) -> Self {
-        let smooth = SmoothJump { event: Box::new(event), map: Box::new(map) };
-        self.with(|jump| jump.differentiate(smooth))
+        let smooth = SmoothEvent { function: Box::new(event), map: Some(Box::new(map)) };
+        Self(self.0.with(|request| request.differentiate(smooth)))
     }
 
     /// Counts changes of sign that come in pairs between two looks at a path with noise, see [`Watched::bridged`].

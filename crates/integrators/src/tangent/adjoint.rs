@@ -31,6 +31,10 @@ use crate::step::{Element, HasFlow, Stepper};
 /// It is the transpose of the [tangent](super::Tangents) of the same run: to round-off, or to the digits of differences where these are its
 /// derivatives. No equation is integrated backwards, since friction would grow.
 ///
+/// At an event with a [jump](crate::Watched::jump) the costate goes back by the transposed saltation matrix, since the time of the event
+/// depends on the start. So does the end of a run at an event that [stops](crate::Watched::stop) it. Both need their derivatives
+/// ([`Jumping::differentiable`](crate::Jumping::differentiable), [`Watched::differentiable`](crate::Watched::differentiable)).
+///
 /// ```
 /// use metriplectic_dynamics::Family;
 /// use metriplectic_fields::Real;
@@ -70,7 +74,8 @@ pub trait Adjoints: Sized {
     ///
     /// # Errors
     ///
-    /// [`TangentError`]; [`TangentError::Broken`] if the schedule has events or corners.
+    /// [`TangentError`]; [`TangentError::Broken`] if the schedule has corners or jumps without
+    /// [derivatives](crate::Jumping::differentiable), and [`TangentError::Grazing`] at an event whose time has none.
     fn adjoint<D>(
         self,
         system: &D,
@@ -197,7 +202,8 @@ where
     ///
     /// # Errors
     ///
-    /// [`TangentError::NotLinearised`] if a step has no derivative.
+    /// [`TangentError::NotLinearised`] if a step has no derivative, and [`TangentError::Broken`] if the loss has a term at the event that
+    /// ended the run and its function has [no derivatives](crate::Watched::differentiable).
     pub fn gradient(
         &self,
         loss: impl Fn(usize, &<FlowOf<D> as SmoothFlow>::Moving) -> Real,
@@ -217,17 +223,31 @@ where
     ///
     /// # Errors
     ///
-    /// [`TangentError::NotLinearised`] if a step has no derivative.
+    /// The errors of [`gradient`](Self::gradient).
     pub fn pull_back<R: Index<usize, Output = f64>>(
         &self,
         rows: &[R],
     ) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
-        in_wide_room::<D, M, _>(self.system, || self.backwards(rows))
+        in_wide_room::<D, M, _>(self.system, || self.backwards(rows, 0.0))
     }
 
+    /// Computes the gradient of the time at which the run has ended: zero, unless it has ended at an
+    /// [event](crate::Watched::stop).
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`gradient`](Self::gradient).
+    pub fn gradient_of_end(&self) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
+        let none: &[DVector<f64>] = &[];
+        let found = in_wide_room::<D, M, _>(self.system, || self.backwards(none, 1.0))?;
+        Ok(LossGradient { value: self.last().time, ..found })
+    }
+
+    /// The gradient of a loss with these derivatives along the states and along the time of the end.
     fn backwards<R: Index<usize, Output = f64>>(
         &self,
         rows: &[R],
+        along_end: f64,
     ) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
         let (n, names) = (self.system.as_flow().directions(), self.system.names().to_vec());
         let all = n + names.len();
@@ -241,7 +261,7 @@ where
             let again =
                 if is_last { None } else { Some(self.again(segment, &self.tape.segments[k + 1])?) };
             for step in again.as_ref().unwrap_or(&self.tape.steps).iter().rev() {
-                costate = self.before(step, costate, &row)?;
+                costate = self.before(step, costate, (&row, along_end))?;
             }
         }
         let row = costate + row(0);
@@ -262,7 +282,7 @@ where
         &self,
         step: &TapedStep<FlowOf<D>>,
         costate: DVector<f64>,
-        row: &impl Fn(usize) -> DVector<f64>,
+        (row, along_end): (&impl Fn(usize) -> DVector<f64>, f64),
     ) -> Result<DVector<f64>, TangentError<SpaceOf<D>>> {
         let time = step.time;
         let through = |parts: &[Part<FlowOf<D>>], mut costate: DVector<f64>| {
@@ -273,7 +293,8 @@ where
             Ok::<_, TangentError<SpaceOf<D>>>(costate)
         };
         let [inside, at_end] = self.tape.recorded(step);
-        let mut before = through(&step.parts, at_end.fold(costate, |sum, k| sum + row(k)))?;
+        let costate = at_end.fold(costate, |sum, k| sum + row(k));
+        let mut before = through(&step.parts, step.end.pull_back(costate, along_end)?)?;
         for (k, parts) in inside.zip(&step.outputs) {
             before += through(parts, row(k))?;
         }

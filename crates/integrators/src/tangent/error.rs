@@ -113,11 +113,11 @@ pub enum TangentError<M: StateSpace> {
     },
     /// The state jumps at an event without derivatives, or steps end at corners.
     #[error(
-        "the schedule has {what}, across which the tangent is not carried; give a jump its derivatives at points of the system with \
-         its parameters (`Jumping::differentiable`), or run up to the first one and go on from there"
+        "the schedule has {what}, across which the tangent is not carried; give a jump or a stop its derivatives at points of the system \
+         with its parameters (`Jumping::differentiable`, `Watched::differentiable`), or run up to the first one and go on from there"
     )]
     Broken {
-        /// The jumps or the corners.
+        /// The jumps, the stop or the corners.
         what: &'static str,
     },
     /// The derivatives of a jump are those of another map than the one by which the state has jumped.
@@ -131,6 +131,19 @@ pub enum TangentError<M: StateSpace> {
         /// Its time.
         time: f64,
         /// The largest difference of an entry, relative to the size of the state.
+        off: f64,
+    },
+    /// The derivatives of an event are those of another function than the one by which it was found.
+    #[error(
+        "at t = {time} the function of the event {event}, given with its derivatives, is {off:.1e} of what it could be and not zero; write \
+         the same function in both"
+    )]
+    OtherFunction {
+        /// The name of the event.
+        event: String,
+        /// Its time.
+        time: f64,
+        /// `|g|/|dg|`, with the entries in units of their sizes.
         off: f64,
     },
     /// An event is grazing: its function hardly changes along the motion, so that its time has no derivative.

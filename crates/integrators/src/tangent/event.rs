@@ -54,7 +54,7 @@ impl<F: Flow> TangentEvent<F> {
         // The function does not depend on a ledger.
         let dg = &dg.clone().resize_vertically(self.velocity.len(), 0.0);
         let rate = dg.dot(&self.velocity);
-        self.crosses(rate, dg)?;
+        self.located().crosses(rate, dg)?;
         Ok(self.state.derivative_of(dg) * -rate.recip())
     }
 
@@ -68,6 +68,20 @@ impl<F: Flow> TangentEvent<F> {
         Ok(self.state.matrix() + &self.velocity * self.time_by(dg)?.transpose())
     }
 
+    /// The event without its derivatives.
+    pub(super) const fn located(&self) -> Located<'_, F> {
+        Located { event: &self.event, velocity: &self.velocity, sizes: &self.sizes }
+    }
+}
+
+/// An event of a run, with the velocity of the discrete map there and the sizes of the entries.
+pub(super) struct Located<'a, F: Flow> {
+    pub(super) event: &'a Event<F::Space>,
+    pub(super) velocity: &'a DVector<f64>,
+    pub(super) sizes: &'a DVector<f64>,
+}
+
+impl<F: Flow> Located<'_, F> {
     /// Refuses an event whose function changes by `rate` along the motion, which is less than its differential makes possible.
     pub(super) fn crosses(
         &self,
@@ -77,7 +91,7 @@ impl<F: Flow> TangentEvent<F> {
         let (dg, speed) = self.lengths(dg);
         let slope = rate.abs() / (dg * speed);
         if slope.is_nan() || slope <= GRAZING {
-            let (event, time) = (self.event.name.to_string(), self.state.time);
+            let (event, time) = (self.event.name.to_string(), self.event.state.time);
             return Err(TangentError::Grazing { event, time, slope });
         }
         Ok(())
@@ -86,7 +100,7 @@ impl<F: Flow> TangentEvent<F> {
     /// The lengths of a differential and of the velocity, in units of the sizes of the entries.
     ///
     /// An entry without a size does not move.
-    fn lengths(&self, dg: &DVector<f64>) -> (f64, f64) {
+    pub(super) fn lengths(&self, dg: &DVector<f64>) -> (f64, f64) {
         let entries = (0..self.sizes.len()).filter(|&i| self.sizes[i] > 0.0);
         let (dg, speed) = entries.fold((0.0, 0.0), |(sum, speed), i| {
             let size = self.sizes[i];

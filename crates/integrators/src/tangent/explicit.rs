@@ -352,7 +352,8 @@ where
     }))
 }
 
-/// How far a step or a jump that is differentiated may end from the one that was taken, relative to the sizes of the entries.
+/// How far a step or a jump that is differentiated may end from the one that was taken, and the function of an event from zero, relative to
+/// the sizes of the entries.
 /// A factor of four fails `tangent/explicit.rs::a_step_that_ends_a_billionth_beside_the_one_that_was_taken_is_another`.
 pub(super) const NEAR: f64 = 1e-9;
 

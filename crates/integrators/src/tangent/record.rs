@@ -13,14 +13,12 @@ use super::event::TangentEvent;
 use super::refined::{REFINEMENTS, difference, refined};
 use super::smooth::{FlowOf, SpaceOf};
 use super::state::TangentState;
-use super::steps::{Inside, Jumps, TangentSteps, in_wide_room};
+use super::steps::{Inside, TangentSteps, in_wide_room, smooth_events};
 use crate::round_off::bound::SUMMED;
 use crate::run::SpanError;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
-use crate::run::event::Request;
-use crate::run::jump::JumpRequest;
 use crate::run::method::Method as _;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::recording::Numbered;
@@ -72,23 +70,7 @@ pub trait Tangents: Sized {
         Self: Stepper<FlowOf<D>>,
     {
         let schedule: Schedule = schedule.into();
-        let listed = schedule.watch.events.iter().map(|event| event.jump.as_ref());
-        let jumps: Jumps<D::MovingWide> =
-            listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
-        let has_jump = |event: &Request| event.jump.is_some();
-        if schedule.watch.events.iter().zip(&jumps).any(|(e, jump)| has_jump(e) && jump.is_none()) {
-            return Err(TangentError::Broken { what: "jumps without derivatives" });
-        }
-        if !schedule.corners.is_empty() {
-            return Err(TangentError::Broken { what: "corners" });
-        }
-        if schedule.backward {
-            return Err(TangentError::Broken { what: "a run back in time" });
-        }
-        // Where a path ends a step beyond the event, the time of the event has no derivative.
-        if self.noise(system.as_flow()).is_some() && !schedule.watch.events.is_empty() {
-            return Err(TangentError::Broken { what: "events on a path with noise" });
-        }
+        let jumps = smooth_events((system, &self), &schedule)?;
         let steps = self.steps(system.as_flow(), x0, schedule)?;
         let laws = in_wide_room::<D, Self, _>(system, || system.wide_rows(&steps.state().point));
         let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());

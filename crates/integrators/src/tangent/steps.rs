@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::beside;
 use super::certificate::Sensitivity;
@@ -18,9 +18,10 @@ use super::state::TangentState;
 use crate::round_off::bound::SUMMED;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
-use crate::run::event::Event;
-use crate::run::jump::SmoothJump;
+use crate::run::event::{Event, Request};
+use crate::run::jump::SmoothEvent;
 use crate::run::last_step::LastStep;
+use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::step::{Element, Flow, Scales, Stepper, Vector as _};
 
@@ -54,6 +55,42 @@ pub(super) fn again<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     Some(Again { memory: steps.saved_memory(), sizes, whole: f64::NAN })
 }
 
+/// The sizes of the entries at an event: the largest ones of the run, and those there.
+pub(super) fn sizes_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, _): (&D, &M),
+    scales: &Scales<VectorOf<D>>,
+    x: &Element<FlowOf<D>>,
+) -> DVector<f64> {
+    let (ends, reached) = (&scales.sizes, system.units(x));
+    DVector::from_fn(system.as_flow().directions(), |i, _| ends.get(i).max(reached[i]))
+}
+
+/// The sizes of all directions after a step of size `h`, which is that of a clock.
+pub(super) fn units_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, _): (&D, &M),
+    x: &Element<FlowOf<D>>,
+    h: f64,
+) -> DVector<f64> {
+    let mut units = system.units(x);
+    if let Some(clock) = system.as_flow().clock() {
+        units[clock] = h.abs();
+    }
+    units
+}
+
+/// The round-off of the laws of a tangent, relative to their terms.
+pub(super) fn rounding<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, method): (&D, &M),
+) -> f64 {
+    if system.takes_steps_beside(method) { beside::rounding() } else { SUMMED }
+}
+
+/// Turns the rows of a tangent to another frame. Those of parameters have none.
+pub(super) fn turn_rows(turn: &DMatrix<f64>, t: &mut DMatrix<f64>) {
+    let turned = turn * t.rows(0, turn.nrows());
+    t.rows_mut(0, turn.nrows()).copy_from(&turned);
+}
+
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
 /// The steps are those of the run without it, bit for bit.
@@ -68,8 +105,38 @@ pub struct TangentSteps<'a, D: Differentiated<M>, M: Stepper<FlowOf<D>>> {
     pub(super) largest: Option<VectorOf<D>>,
 }
 
-/// The jumps of a schedule with their derivatives, at points of this type.
-pub(super) type Jumps<P> = Vec<Option<Arc<SmoothJump<P>>>>;
+/// The events of a schedule with their derivatives, at points of this type.
+pub(super) type Jumps<P> = Vec<Option<Arc<SmoothEvent<P>>>>;
+
+/// The events of a schedule over which derivatives are carried.
+///
+/// # Errors
+///
+/// [`TangentError::Broken`] if a jump has no derivatives, a path with noise has events, or there are corners.
+pub(super) fn smooth_events<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    (system, method): (&D, &M),
+    schedule: &Schedule,
+) -> Result<Jumps<D::MovingWide>, TangentError<SpaceOf<D>>> {
+    let events = &schedule.watch.events;
+    let smooth: Jumps<D::MovingWide> = events.iter().map(Request::smooth).collect();
+    let has_map = |smooth: &SmoothEvent<D::MovingWide>| smooth.map.is_some();
+    let lacks_map = |(event, smooth): (&Request, &Option<Arc<SmoothEvent<D::MovingWide>>>)| {
+        event.jump.is_some() && !smooth.as_deref().is_some_and(has_map)
+    };
+    let what = if events.iter().zip(&smooth).any(lacks_map) {
+        "jumps without derivatives"
+    } else if !schedule.corners.is_empty() {
+        "corners"
+    } else if schedule.backward {
+        "a run back in time"
+    } else if method.noise(system.as_flow()).is_some() && !events.is_empty() {
+        // Where a path ends a step beyond the event, the time of the event has no derivative.
+        "events on a path with noise"
+    } else {
+        return Ok(smooth);
+    };
+    Err(TangentError::Broken { what })
+}
 
 impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> fmt::Debug for TangentSteps<'_, D, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -211,11 +278,7 @@ where
 
     /// The sizes of all directions after a step of size `h`, which is that of a clock.
     pub(super) fn units(&self, x: &Element<FlowOf<D>>, h: f64) -> DVector<f64> {
-        let mut units = self.system.units(x);
-        if let Some(clock) = self.system.as_flow().clock() {
-            units[clock] = h.abs();
-        }
-        units
+        units_at((self.system, self.steps.method()), x, h)
     }
 
     /// Returns whether two states are the same but for the time and what is booked.
@@ -226,8 +289,7 @@ where
 
     /// The round-off of the laws of the tangent, relative to their terms.
     pub(super) fn rounding(&self) -> f64 {
-        let is_beside = self.system.takes_steps_beside(self.steps.method());
-        if is_beside { beside::rounding() } else { SUMMED }
+        rounding((self.system, self.steps.method()))
     }
 
     /// The state at a fraction of the last step, by a step of that size, with its derivatives.
@@ -252,7 +314,7 @@ where
         event: Event<SpaceOf<D>>,
         theta: f64,
     ) -> Result<TangentEvent<FlowOf<D>>, Unlinearised> {
-        let (flow, n) = (self.steps.flow(), self.steps.flow().directions());
+        let flow = self.steps.flow();
         let (reached, Moved { mut carried, along_h: mut velocity }) = self.part(last, theta)?;
         if velocity.iter().any(|v| v.is_nan()) {
             return Err(Unlinearised::Branch);
@@ -260,13 +322,11 @@ where
         // The state of the output is not that of the step of this size, and may have another frame.
         if let Some(turn) = flow.turn(&reached, &event.state.point) {
             velocity = &turn * velocity;
-            let turned = turn * carried.t.rows(0, n);
-            carried.t.rows_mut(0, n).copy_from(&turned);
+            turn_rows(&turn, &mut carried.t);
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), carried);
-        let (ends, reached) = (&scales.sizes, self.system.units(&state.point));
-        let sizes = DVector::from_fn(n, |i, _| ends.get(i).max(reached[i]));
+        let sizes = sizes_at((self.system, self.steps.method()), scales, &state.point);
         Ok(TangentEvent { event, state, velocity, sizes, after: None })
     }
 }

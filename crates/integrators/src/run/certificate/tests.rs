@@ -37,6 +37,7 @@ const ONE_FALL: Certificate = Certificate {
     exchanged_in_jumps: Exchanged::NOTHING,
     noise: None,
     projected: false,
+    evaluated: Vec::new(),
 };
 
 #[test]

@@ -3,6 +3,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
+use metriplectic_equations::Evaluated;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::run::certificate::{
@@ -80,6 +81,9 @@ struct CertificateForm {
     #[serde(skip)]
     noise: Option<NoiseSummary>,
     projected: bool,
+    // It is that of the system.
+    #[serde(skip)]
+    evaluated: Vec<Evaluated>,
 }
 
 #[derive(Serialize, Deserialize)]

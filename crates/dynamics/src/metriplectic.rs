@@ -112,7 +112,9 @@ pub fn evaluated<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Vec<Eval
     }
     let mut fields = OfFields::<Y::Manifold>(x, Vec::new());
     fields.add("energy", system.energy());
-    fields.add("entropy", system.entropy());
+    if system.second_law() != SecondLaw::NoEntropy {
+        fields.add("entropy", system.entropy());
+    }
     system.invariants().each(&mut fields);
     let tensors = [("metric", Y::Metric::IS_RECORDED), ("Poisson tensor", Y::Bracket::IS_RECORDED)];
     let tapes = tensors.into_iter().filter(|(_, is_recorded)| *is_recorded);

@@ -12,7 +12,7 @@ fn recordable(
     graph: Graph,
 ) -> Lattice<impl metriplectic::lattices::Model<Manifold = Euclidean<3>>> {
     Lattice::on(graph, Euclidean::<3>)
-        .bracket(Poisson::constant(CANONICAL).unwrap())
+        .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
         .energy(field!(|x: &Vector3<Real>| x.y * x.y * 0.5 + (x.z * 0.5).exp() * 2.0))
         .bond_energy(field!(|(x, y): &(Vector3<Real>, Vector3<Real>)| {
             let r = y.x - x.x;
@@ -22,7 +22,7 @@ fn recordable(
         .bond_onsager(onsager)
         .conserved(|x: &Vector3<Real>| x.y)
         .build()
-        .unwrap()
+        .expect("the parts make a lattice")
 }
 
 const SMALL: [(&str, usize); 3] =

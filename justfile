@@ -161,8 +161,12 @@ instructions *flags:
         cargo bench --package metriplectic-benches --bench step -- --instructions {{ flags }}
     fi
 
+# count the instructions of a step against the same one by hand, for 3 to 192 variables: docs/peers.md; a part of `peers`
+growth:
+    cargo bench --package metriplectic-benches --bench growth
+
 # compare with other solvers, tables and docs/gallery/peers.svg: a package of its own, see docs/peers.md
-peers *options:
+peers *options: growth
     cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/docs/gallery/peers.svg {{ options }}
 
 # compare with the methods of the literature that keep laws, a table of docs/peers.md

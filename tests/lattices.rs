@@ -14,6 +14,8 @@ mod implicit;
 mod limiting_sites;
 #[path = "models/lattices.rs"]
 mod models;
+#[path = "lattices/recorded.rs"]
+mod recorded;
 #[path = "lattices/simulations.rs"]
 mod simulations;
 #[path = "models/tables.rs"]

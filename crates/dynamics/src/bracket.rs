@@ -48,6 +48,9 @@ pub struct BracketArgs<'a, M: Manifold, G: Riemannian<M>, D: Scalar = f64> {
     note = "a Poisson tensor of your own is `Poisson::field(|x| matrix)` or `Poisson::constant(matrix)?`"
 )]
 pub trait Bracket<M: Manifold, G: Riemannian<M>> {
+    /// Says whether the tensor is evaluated from a recording.
+    const IS_RECORDED: bool = false;
+
     /// Computes the vector `Π(x) α`, with components in the frame of the chart of `x`.
     ///
     /// # Errors

@@ -2,8 +2,8 @@
 
 use metriplectic_equations::judge::coordinate_scales;
 use metriplectic_equations::{
-    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, Path, Paths,
-    PointError, SecondLaw, Sizes,
+    Covectors, ENERGY, ENTROPY, Equations, Evaluated, Jet, Kind, MetricError, Model, Part, Path,
+    Paths, PointError, SecondLaw, Sizes,
 };
 use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{
@@ -18,7 +18,7 @@ use num_dual::Dual64;
 use crate::bracket::{Bracket, BracketArgs};
 use crate::dissipation::Dissipation;
 use crate::invariants::{Action, Invariants, Visitor};
-use crate::metriplectic::{CountOf, Dim, Metriplectic, Point};
+use crate::metriplectic::{CountOf, Dim, Metriplectic, Point, evaluated};
 use crate::velocity::{self, Gradient, independence, irreversible};
 
 /// A system that answers the questions of [`Equations`] and [`Model`], by reading points and columns from slices.
@@ -383,6 +383,10 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
 
     fn is_verified(&self) -> bool {
         self.0.is_verified()
+    }
+
+    fn evaluated(&self, x: &[f64]) -> Vec<Evaluated> {
+        evaluated(self.0, &point::<Of<Y>>(x))
     }
 
     fn kind(&self, invariant: usize) -> Kind {

@@ -1,11 +1,12 @@
 //! The parts of a metriplectic system: manifold, metric, bracket, dissipation, energy, entropy, invariants.
 
+use metriplectic_equations::{Evaluated, Evaluation, Kind};
 use metriplectic_fields::{ChartPoint, Scalar, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, MetricAt, Riemannian};
 
 use crate::bracket::{Bracket, BracketArgs};
 use crate::dissipation::Dissipation;
-use crate::invariants::Invariants;
+use crate::invariants::{Invariants, Visitor};
 use crate::vector_field::VectorField;
 use crate::verification::{Begun, Verify};
 
@@ -91,6 +92,34 @@ pub trait Metriplectic:
     ) -> BracketArgs<'a, Self::Manifold, Self::Metric, D> {
         BracketArgs { space: self.manifold(), g, s }
     }
+}
+
+/// Lists the fields of a system that are evaluated from a recording, and why the others are not.
+#[must_use]
+pub fn evaluated<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Vec<Evaluated> {
+    struct OfFields<'a, M: Space>(&'a M::Point<f64>, Vec<(&'static str, Evaluation)>);
+    impl<M: Space> OfFields<'_, M> {
+        fn add<F: ScalarField<M>>(&mut self, name: &'static str, f: &F) {
+            if !F::IS_CONSTANT {
+                self.1.push((name, f.evaluation(self.0)));
+            }
+        }
+    }
+    impl<M: Space> Visitor<M> for OfFields<'_, M> {
+        fn visit(&mut self, kind: Kind, f: &impl ScalarField<M>) {
+            self.add(kind.name(), f);
+        }
+    }
+    let mut fields = OfFields::<Y::Manifold>(x, Vec::new());
+    fields.add("energy", system.energy());
+    if system.second_law() != SecondLaw::NoEntropy {
+        fields.add("entropy", system.entropy());
+    }
+    system.invariants().each(&mut fields);
+    let tensors = [("metric", Y::Metric::IS_RECORDED), ("Poisson tensor", Y::Bracket::IS_RECORDED)];
+    let tapes = tensors.into_iter().filter(|(_, is_recorded)| *is_recorded);
+    fields.1.extend(tapes.map(|(name, _)| (name, Evaluation::Tape)));
+    Evaluated::list(fields.1)
 }
 
 /// Takes parts of another system, in an implementation of [`Metriplectic`] for a type that replaces the

@@ -1,7 +1,7 @@
 //! The questions that every system answers.
 
 use crate::room::with_numbers;
-use crate::{Kind, Model, PointError, SecondLaw};
+use crate::{Evaluated, Kind, Model, PointError, SecondLaw};
 
 /// The number of the energy `H` among the laws.
 pub const ENERGY: usize = 0;
@@ -48,6 +48,12 @@ pub trait Equations {
     /// Returns the promise of the system about its entropy.
     fn second_law(&self) -> SecondLaw {
         SecondLaw::NoEntropy
+    }
+
+    /// Returns which fields are evaluated from a recording, as found at a state; nothing where none is written to be recorded.
+    fn evaluated(&self, x: &[f64]) -> Vec<Evaluated> {
+        let _ = x;
+        Vec::new()
     }
 
     /// Returns why the further invariant with this number, from 0 on, is conserved.

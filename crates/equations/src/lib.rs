@@ -21,6 +21,7 @@
 //! | [`paths`] | [`Paths`]: the paths of steps on spaces that are not flat |
 //! | [`differences`] | [`Differences`]: a model whose derivatives are formed by differences of its parts |
 //! | [`terms`] | [`FrictionTerms`]: a friction as a sum of terms, of which thermal noise is made |
+//! | [`evaluated`] | [`Evaluated`]: which fields are evaluated from a recording |
 //! | [`judge`] | the laws of a model at a start, around it, and at the states of a run |
 //! | [`report`] | [`Report`]: the residual of every law |
 //! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
@@ -31,6 +32,7 @@
 pub mod broken_law;
 pub mod differences;
 pub mod equations;
+pub mod evaluated;
 pub mod judge;
 pub mod kind;
 pub mod laws;
@@ -49,6 +51,7 @@ pub mod terms;
 pub use broken_law::BrokenLaw;
 pub use differences::{Apart, Differences, Slopes, slopes};
 pub use equations::{ENERGY, ENTROPY, Equations, Sizes};
+pub use evaluated::{Evaluated, Evaluation};
 pub use kind::Kind;
 pub use metric_error::{MetricError, NotPositive};
 pub use model::{Covectors, Jet, Model, Part};

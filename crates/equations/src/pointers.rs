@@ -59,6 +59,11 @@ macro_rules! answered_by {
                 $other.second_law()
             }
 
+            fn evaluated(&self, x: &[f64]) -> Vec<$crate::Evaluated> {
+                let $this = self;
+                $other.evaluated(x)
+            }
+
             fn kind(&self, invariant: usize) -> $crate::Kind {
                 let $this = self;
                 $other.kind(invariant)

@@ -1,7 +1,9 @@
 //! Smooth functions on a manifold: scalar fields (energy, entropy) and matrix fields (metric,
 //! Poisson tensor).
 
-use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Square, Vector};
+use crate::{
+    ChartPoint, Column, Dimension, Evaluation, Form, Matrix, Real, Scalar, Space, Square, Vector,
+};
 
 /// A smooth function `f: M → R`.
 ///
@@ -38,6 +40,12 @@ pub trait ScalarField<M: Space> {
 
     /// Evaluates `f(x)` at any scalar.
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D;
+
+    /// Says what the derivatives come from, and tries to record a function that is written to be recorded.
+    fn evaluation(&self, x: &M::Point<f64>) -> Evaluation {
+        let _ = x;
+        Evaluation::Function
+    }
 
     /// Evaluates `f(x)` at the scalar of closures, at which a closure needs no lift.
     #[inline]
@@ -216,6 +224,9 @@ impl<M: Space> Jet2<M> {
     note = "a type of your own implements `MatrixField` with the generic method `at`"
 )]
 pub trait MatrixField<M: Space> {
+    /// Says whether the field is evaluated from a recording.
+    const IS_RECORDED: bool = false;
+
     /// Evaluates the matrix at `x`, at any scalar.
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D>;
 

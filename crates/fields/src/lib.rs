@@ -53,7 +53,7 @@ pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes, seeded};
 pub use logarithmic_mean::logarithmic_mean;
-pub use metriplectic_equations::{BrokenLaw, NotPositive};
+pub use metriplectic_equations::{BrokenLaw, Evaluation, NotPositive};
 pub use piecewise::Piecewise;
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};

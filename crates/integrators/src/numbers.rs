@@ -15,7 +15,7 @@ use std::sync::Arc;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{Erase, ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
-use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Evaluated, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
 pub(crate) use self::answered::{Answered, InTypes};
@@ -228,6 +228,10 @@ impl<S: Equations> Flow for FromEquations<S> {
 
     fn entropy_law(&self) -> SecondLaw {
         self.0.second_law()
+    }
+
+    fn evaluated(&self, x: &Entries) -> Vec<Evaluated> {
+        self.0.evaluated(x)
     }
 
     fn kinds(&self) -> Vec<Kind> {

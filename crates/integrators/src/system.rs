@@ -12,6 +12,7 @@ use metriplectic_dynamics::velocity::{
 use metriplectic_dynamics::{
     Dissipation, InNumbers, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
+use metriplectic_equations::Evaluated;
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{InnerProduct as _, Manifold, PointError};
 
@@ -101,6 +102,10 @@ impl<Y: Metriplectic> Flow for Y {
     #[inline]
     fn entropy_law(&self) -> SecondLaw {
         self.second_law()
+    }
+
+    fn evaluated(&self, x: &Point<Y>) -> Vec<Evaluated> {
+        metriplectic_dynamics::metriplectic::evaluated(self, x)
     }
 
     fn kinds(&self) -> Vec<Kind> {

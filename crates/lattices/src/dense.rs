@@ -7,7 +7,8 @@
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_equations::{
-    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, Paths, PointError, Sizes,
+    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Evaluated, Part, Paths, PointError,
+    Sizes,
 };
 use metriplectic_fields::{Column as _, Space as _};
 use metriplectic_integrators::{
@@ -87,6 +88,10 @@ impl<P: Model> Equations for Dense<'_, P> {
 
     fn second_law(&self) -> SecondLaw {
         self.0.entropy_law()
+    }
+
+    fn evaluated(&self, x: &[f64]) -> Vec<Evaluated> {
+        self.0.evaluated(&listed(x))
     }
 
     fn kind(&self, _: usize) -> Kind {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use metriplectic_fields::{Column, Jet1, Real, ScalarField, Space, Vector};
+use metriplectic_fields::{Column, Evaluation, Jet1, Real, ScalarField, Space, Vector};
 
 /// A smooth function of a point of `M` and of data `D`: the energy or the entropy of a site, or the energy of a bond
 /// as a function on `M × M`.
@@ -17,6 +17,14 @@ pub trait LocalField<M: Space, D>: Sync {
 
     /// Computes the value and the differential.
     fn jet(&self, x: &M::Point<f64>, data: &D) -> Jet1<M>;
+
+    /// Passes on what the derivatives of each summand come from, as found at a point.
+    fn evaluations(&self, x: &M::Point<f64>, put: &mut dyn FnMut(Evaluation)) {
+        let _ = x;
+        if Self::PRESENT {
+            put(Evaluation::Function);
+        }
+    }
 }
 
 /// A function that is not there.
@@ -56,6 +64,11 @@ where
         let [f, g] = [self.0.jet(x, data), self.1.jet(x, data)];
         Jet1 { value: f.value + g.value, df: f.df + g.df }
     }
+
+    fn evaluations(&self, x: &M::Point<f64>, put: &mut dyn FnMut(Evaluation)) {
+        self.0.evaluations(x, put);
+        self.1.evaluations(x, put);
+    }
 }
 
 /// A [`ScalarField`], the same at every site or bond.
@@ -71,6 +84,10 @@ impl<M: Space, D, F: ScalarField<M> + Sync> LocalField<M, D> for Uniform<F> {
     #[inline]
     fn jet(&self, x: &M::Point<f64>, _: &D) -> Jet1<M> {
         self.0.jet1(x)
+    }
+
+    fn evaluations(&self, x: &M::Point<f64>, put: &mut dyn FnMut(Evaluation)) {
+        put(self.0.evaluation(x));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
+use metriplectic_equations::Evaluated;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
 use metriplectic_integrators::open::surrounded::against_simpson;
@@ -196,6 +197,20 @@ impl<P: Model> Flow for Lattice<P> {
 
     fn entropy_law(&self) -> SecondLaw {
         if P::ENTROPY { SecondLaw::Exact } else { SecondLaw::NoEntropy }
+    }
+
+    fn evaluated(&self, x: &Points<P::Manifold>) -> Vec<Evaluated> {
+        let mut fields = Vec::new();
+        let bond = self
+            .layout
+            .bonds()
+            .first()
+            .map(|ends| ends.map(|site| x[site as usize].clone()).into());
+        if let Some(site) = x.first() {
+            self.parts
+                .evaluations(site, bond.as_ref(), &mut |name, from| fields.push((name, from)));
+        }
+        Evaluated::list(fields)
     }
 
     fn kinds(&self) -> Vec<Kind> {

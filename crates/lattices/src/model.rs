@@ -1,7 +1,7 @@
 //! The parts of a lattice, as its loops need them.
 
 use metriplectic_dynamics::{Bracket, BracketArgs};
-use metriplectic_fields::{ChartPoint, Column, Jet1, Vector};
+use metriplectic_fields::{ChartPoint, Column, Evaluation, Jet1, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, MetricAt, Product, Riemannian, Times};
 
 use crate::fields::{ConservedSums, LocalData, LocalField};
@@ -51,6 +51,14 @@ pub trait Model: Sync {
 
     /// A conserved function at a site.
     fn sum(&self, index: usize, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
+
+    /// Passes on the names of the fields of a site and of a bond, and what their derivatives come from.
+    fn evaluations(
+        &self,
+        site: &PointOf<Self>,
+        bond: Option<&PairOf<Self>>,
+        put: &mut dyn FnMut(&'static str, Evaluation),
+    );
 
     /// Returns whether there is a bracket.
     fn has_bracket(&self) -> bool;
@@ -189,6 +197,20 @@ where
     #[inline]
     fn sum(&self, index: usize, site: usize, x: &M::Point<f64>) -> Jet1<M> {
         self.sums.jet(index, x, self.data.sites.of(site))
+    }
+
+    fn evaluations(
+        &self,
+        site: &M::Point<f64>,
+        bond: Option<&PairOf<Self>>,
+        put: &mut dyn FnMut(&'static str, Evaluation),
+    ) {
+        let Fields { energy, bond_energy, entropy, .. } = &self.fields;
+        energy.evaluations(site, &mut |from| put("energy of a site", from));
+        if let Some(bond) = bond {
+            bond_energy.evaluations(bond, &mut |from| put("energy of a bond", from));
+        }
+        entropy.evaluations(site, &mut |from| put("entropy of a site", from));
     }
 
     fn has_bracket(&self) -> bool {

@@ -32,6 +32,8 @@ impl<F> fmt::Debug for FieldMetric<F> {
 }
 
 impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
+    const IS_RECORDED: bool = F::IS_RECORDED;
+
     type At<D: Scalar> = Factored<M::Dim, D>;
 
     fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {

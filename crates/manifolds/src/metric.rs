@@ -35,6 +35,9 @@ pub trait Riemannian<M: Space> {
     #[doc(hidden)]
     const IS_CANONICAL: bool = false;
 
+    /// Says whether the metric is evaluated from a recording.
+    const IS_RECORDED: bool = false;
+
     /// The metric at one point.
     type At<D: Scalar>: InnerProduct<Vector<M, D>>;
 

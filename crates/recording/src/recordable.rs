@@ -1,12 +1,13 @@
 //! Closures that can be recorded.
 
 use metriplectic_fields::{
-    Column, Dimension, Form, Jet1, Jet2, MatrixField, Real, Scalar, ScalarField, Vector,
+    Column, Dimension, Evaluation, Form, Jet1, Jet2, MatrixField, Real, Scalar, ScalarField, Vector,
 };
 use metriplectic_manifolds::Manifold;
 
 use crate::{
     PointEntries, Recorded, RecordedField, RecordingError, Tape, TapeField, TapeMatrix, record,
+    recorded_field::GRADIENT_FROM,
 };
 
 /// Writes a closure over `Real` that can be recorded too: a [`Recordable`].
@@ -76,6 +77,14 @@ impl<F, R> Recordable<F, R> {
         M: PointEntries,
         R: Fn(&M::Point<Recorded>) -> Recorded,
     {
+        self.tape_at::<M>(x)
+    }
+
+    fn tape_at<M>(&self, x: &M::Point<f64>) -> Result<Tape, RecordingError>
+    where
+        M: PointEntries,
+        R: Fn(&M::Point<Recorded>) -> Recorded,
+    {
         record(&M::entries(x), |entries| vec![(self.recording)(&point::<M>(entries))])
     }
 
@@ -111,7 +120,7 @@ impl<F, R> Recordable<F, R> {
     /// The errors of [`record`](crate::record()), and [`RecordingError::Disagrees`] if the closure gives other numbers.
     pub fn recorded<M>(
         self,
-        space: &M,
+        _: &M,
         x: &M::Point<f64>,
     ) -> Result<RecordedField<M, F>, RecordingError>
     where
@@ -119,11 +128,22 @@ impl<F, R> Recordable<F, R> {
         F: Fn(&M::Point<Real>) -> Real,
         R: Fn(&M::Point<Recorded>) -> Recorded,
     {
-        let tape = TapeField::new(self.tape(space, x)?)?;
+        let tape = self.checked_tape::<M>(x)?;
+        Ok(RecordedField::new(self.closure, tape))
+    }
+
+    /// Records a scalar field, and checks the tape against the closure.
+    fn checked_tape<M>(&self, x: &M::Point<f64>) -> Result<TapeField<M>, RecordingError>
+    where
+        M: PointEntries,
+        F: Fn(&M::Point<Real>) -> Real,
+        R: Fn(&M::Point<Recorded>) -> Recorded,
+    {
+        let tape = TapeField::new(self.tape_at::<M>(x)?)?;
         for turn in [0.0, 1.0, 2.0] {
             agree(&tape, &self.closure, &near::<M>(x, turn))?;
         }
-        Ok(RecordedField::new(self.closure, tape))
+        Ok(tape)
     }
 }
 
@@ -176,9 +196,19 @@ fn agree<M: PointEntries>(
 #[diagnostic::do_not_recommend]
 impl<M, F, R> ScalarField<M> for Recordable<F, R>
 where
-    M: Manifold,
+    M: PointEntries,
     F: Fn(&M::Point<Real>) -> Real,
+    R: Fn(&M::Point<Recorded>) -> Recorded,
 {
+    fn evaluation(&self, x: &M::Point<f64>) -> Evaluation {
+        match self.checked_tape::<M>(x) {
+            Ok(_) if M::Dim::LEN >= GRADIENT_FROM => Evaluation::Recordable,
+            Ok(_) => Evaluation::FewVariables(M::Dim::LEN),
+            Err(RecordingError::Branches { file, line, .. }) => Evaluation::Branches { file, line },
+            Err(_) => Evaluation::Unrecordable,
+        }
+    }
+
     #[inline]
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {
         ScalarField::<M>::at(&self.closure, x)

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Dimension, Jet1, Jet2, Matrix, Real, Scalar, ScalarField, Vector};
+use metriplectic_fields::{
+    Dimension, Evaluation, Jet1, Jet2, Matrix, Real, Scalar, ScalarField, Vector,
+};
 
 use crate::{PointEntries, Tape, TapeField};
 
@@ -13,7 +15,7 @@ use crate::{PointEntries, Tape, TapeField};
 /// 120,747 and 19,607 with 48.
 ///
 /// A factor of four fails `tests/recorded_fields.rs::each_derivative_comes_from_the_faster_one`.
-const GRADIENT_FROM: usize = 9;
+pub(crate) const GRADIENT_FROM: usize = 9;
 
 /// The fewest variables with which the Hessian by sweeps takes fewer instructions than by dual numbers.
 ///
@@ -65,6 +67,14 @@ where
     M: PointEntries,
     F: Fn(&M::Point<Real>) -> Real,
 {
+    fn evaluation(&self, _: &M::Point<f64>) -> Evaluation {
+        if M::Dim::LEN >= GRADIENT_FROM {
+            Evaluation::Tape
+        } else {
+            Evaluation::FewVariables(M::Dim::LEN)
+        }
+    }
+
     #[inline]
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {
         if const { D::NDERIV > 0 && M::Dim::LEN >= GRADIENT_FROM } {

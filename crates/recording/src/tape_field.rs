@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use crate::{PointEntries, RecordingError, Tape, room};
 use metriplectic_fields::{
-    Dimension, Form, Jet1, Jet2, Matrix, MatrixField, Real, Scalar, ScalarField, Square, Vector,
-    seeded,
+    Dimension, Evaluation, Form, Jet1, Jet2, Matrix, MatrixField, Real, Scalar, ScalarField,
+    Square, Vector, seeded,
 };
 
 /// A tape as a scalar field: a function of the entries of a point.
@@ -101,6 +101,10 @@ impl<M: PointEntries> TapeField<M> {
 
 #[diagnostic::do_not_recommend]
 impl<M: PointEntries> ScalarField<M> for TapeField<M> {
+    fn evaluation(&self, _: &M::Point<f64>) -> Evaluation {
+        Evaluation::Tape
+    }
+
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {
         room::with(|room| {
             self.forward(x, &mut room.values);
@@ -196,6 +200,8 @@ fn fill<M: PointEntries, D: Scalar>(x: &M::Point<D>, inputs: &mut [D]) {
 
 #[diagnostic::do_not_recommend]
 impl<M: PointEntries> MatrixField<M> for TapeMatrix<M> {
+    const IS_RECORDED: bool = true;
+
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D> {
         room::with(|room| {
             self.forward(x, &mut room.values);

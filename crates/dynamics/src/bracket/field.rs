@@ -32,6 +32,8 @@ impl<F> FieldPoisson<F> {
 }
 
 impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPoisson<F> {
+    const IS_RECORDED: bool = F::IS_RECORDED;
+
     fn apply<D: Scalar>(
         &self,
         at: &BracketArgs<'_, M, G, D>,

@@ -2,6 +2,7 @@
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_equations::Evaluated;
 use metriplectic_manifolds::PointError;
 
 use super::fluctuating::Fluctuating;
@@ -100,6 +101,10 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
 
     fn entropy_law(&self) -> SecondLaw {
         self.flow().entropy_law()
+    }
+
+    fn evaluated(&self, x: &Element<F>) -> Vec<Evaluated> {
+        self.flow().evaluated(x)
     }
 
     fn kinds(&self) -> Vec<Kind> {

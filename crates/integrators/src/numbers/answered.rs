@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
-use metriplectic_equations::Equations;
+use metriplectic_equations::{Equations, Evaluated};
 use metriplectic_manifolds::PointError;
 
 use super::FromEquations;
@@ -138,6 +138,7 @@ impl Flow for Answered<'_> {
         fn onto(&self, y: &Entries, laws: &Laws<Values>, entropy: Option<f64>) -> Option<Entries>;
         fn element(&self, entries: &[f64]) -> Result<Entries, PointError>;
         fn entropy_law(&self) -> SecondLaw;
+        fn evaluated(&self, x: &Entries) -> Vec<Evaluated>;
         fn kinds(&self) -> Vec<Kind>;
         fn check(&self, x0: &Entries) -> Result<(), ModelError>;
         fn is_verified(&self) -> bool;

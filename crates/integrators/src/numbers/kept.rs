@@ -1,6 +1,6 @@
 //! A system in plain numbers with the answers that do not change.
 
-use metriplectic_equations::{Equations, Kind, Model, PointError, SecondLaw, Sizes};
+use metriplectic_equations::{Equations, Evaluated, Kind, Model, PointError, SecondLaw, Sizes};
 
 /// A system whose sizes and promise are asked for once, and which is not asked for the charts of a vector space.
 #[expect(missing_debug_implementations, reason = "systems have no `Debug`")]
@@ -62,6 +62,10 @@ impl Equations for Kept<'_> {
     #[inline]
     fn second_law(&self) -> SecondLaw {
         self.second_law
+    }
+
+    fn evaluated(&self, x: &[f64]) -> Vec<Evaluated> {
+        self.system.evaluated(x)
     }
 
     fn kind(&self, invariant: usize) -> Kind {

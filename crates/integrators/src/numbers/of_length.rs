@@ -4,7 +4,7 @@
 //! Their stages ask the system one question each. A step has the bits of the types of a system.
 
 use metriplectic_dynamics::SecondLaw;
-use metriplectic_equations::{ENTROPY, Equations};
+use metriplectic_equations::{ENTROPY, Equations, Evaluated};
 use metriplectic_manifolds::PointError;
 
 use super::answered::Answered;
@@ -97,6 +97,10 @@ impl<const N: usize, const E: usize> Flow for OfLength<'_, N, E> {
 
     fn element(&self, entries: &[f64]) -> Result<[f64; E], PointError> {
         self.answered.element(entries).map(|x| List::of(&x))
+    }
+
+    fn evaluated(&self, x: &[f64; E]) -> Vec<Evaluated> {
+        self.system.evaluated(x)
     }
 
     #[inline]

@@ -204,6 +204,10 @@ macro_rules! open_flow {
                 }
             }
 
+            fn evaluated(&self, x: &$crate::Element<Self>) -> Vec<metriplectic_equations::Evaluated> {
+                $crate::open::OpenFlow::at(self, 0.0).evaluated(&x.x)
+            }
+
             fn kinds(&self) -> Vec<metriplectic_dynamics::invariants::Kind> {
                 $crate::open::OpenFlow::at(self, 0.0).kinds()
             }

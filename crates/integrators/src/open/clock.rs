@@ -40,6 +40,9 @@ pub trait Clock<M: Space, H>: Copy + Default + fmt::Debug + Send + Sync + 'stati
     /// Evaluates the same at the scalar of closures.
     fn at_real(energy: &H, times: [f64; 2], x: &M::Point<Real>) -> Real;
 
+    /// The field itself if it does not depend on time: it may know its derivatives.
+    fn still(energy: &H) -> Option<&impl ScalarField<M>>;
+
     /// Evaluates `H(t, x)` with the derivatives that `t` and `x` carry.
     fn in_time(energy: &H, t: Real, x: &M::Point<Real>) -> Real;
 
@@ -67,6 +70,11 @@ impl<M: Space, H: ScalarField<M>> Clock<M, H> for Still {
     #[inline]
     fn at_real(energy: &H, _: [f64; 2], x: &M::Point<Real>) -> Real {
         energy.at_real(x)
+    }
+
+    #[inline]
+    fn still(energy: &H) -> Option<&impl ScalarField<M>> {
+        Some(energy)
     }
 
     fn in_time(energy: &H, _: Real, x: &M::Point<Real>) -> Real {
@@ -103,6 +111,11 @@ impl<M: Space, F: Fn(Real, &M::Point<Real>) -> Real> Clock<M, AtTime<F>> for InT
             return first;
         }
         (first + energy(Real::from(end), x)) * 0.5
+    }
+
+    #[inline]
+    fn still(_: &AtTime<F>) -> Option<&impl ScalarField<M>> {
+        None::<&f64>
     }
 
     #[inline]

@@ -8,6 +8,7 @@ use metriplectic_dynamics::{
     Dissipation as _, Metriplectic, ModelError, SecondLaw, VectorField, Verify as _,
     invariants::Kind, system::Point,
 };
+use metriplectic_equations::Evaluated;
 use metriplectic_fields::{ChartPoint, Column, Space as _, Vector};
 use metriplectic_manifolds::{Manifold, PointError};
 
@@ -189,6 +190,10 @@ where
             SecondLaw::NoEntropy if X::BATHS > 0 => SecondLaw::Exact,
             law => law,
         }
+    }
+
+    fn evaluated(&self, x: &StateOf<Y>) -> Vec<Evaluated> {
+        self.closed().evaluated(&x.x)
     }
 
     fn kinds(&self) -> Vec<Kind> {

@@ -10,7 +10,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_equations::{
-    Apart, Covectors, Differences, Equations, Kind, Part, Path, Paths, PointError, Sizes,
+    Apart, Covectors, Differences, Equations, Evaluated, Kind, Part, Path, Paths, PointError, Sizes,
 };
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
@@ -186,6 +186,10 @@ impl<F: OpenFlow> Equations for Driven<'_, F> {
 
     fn second_law(&self) -> SecondLaw {
         self.ask(0.0, |parts| parts.second_law())
+    }
+
+    fn evaluated(&self, x: &[f64]) -> Vec<Evaluated> {
+        self.ask(0.0, |parts| parts.evaluated(x))
     }
 
     fn kind(&self, invariant: usize) -> Kind {

@@ -4,7 +4,9 @@ use std::marker::PhantomData;
 
 use metriplectic_dynamics::exchange::{Driven, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, parts_of};
-use metriplectic_fields::{Real, Scalar, ScalarField, Space};
+use metriplectic_fields::{
+    Evaluation, Jet1, Jet2, Matrix, Real, Scalar, ScalarField, Space, Vector,
+};
 
 use super::clock::Clock;
 
@@ -34,6 +36,42 @@ impl<M: Space, C: Clock<M, H>, H> ScalarField<M> for EnergyAt<'_, C, H> {
     #[inline]
     fn at_real(&self, x: &M::Point<Real>) -> Real {
         C::at_real(self.energy, self.times, x)
+    }
+
+    fn evaluation(&self, x: &M::Point<f64>) -> Evaluation {
+        C::still(self.energy).map_or(Evaluation::Function, |still| still.evaluation(x))
+    }
+
+    #[inline]
+    fn jet1(&self, x: &M::Point<f64>) -> Jet1<M> {
+        let mean = |x: &M::Point<Real>| self.at_real(x);
+        C::still(self.energy)
+            .map_or_else(|| ScalarField::<M>::jet1(&mean, x), |still| still.jet1(x))
+    }
+
+    #[inline]
+    fn jet2(&self, x: &M::Point<f64>) -> Jet2<M> {
+        let mean = |x: &M::Point<Real>| self.at_real(x);
+        C::still(self.energy)
+            .map_or_else(|| ScalarField::<M>::jet2(&mean, x), |still| still.jet2(x))
+    }
+
+    #[inline]
+    fn differential_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Vector<M> {
+        let mean = |x: &M::Point<Real>| self.at_real(x);
+        C::still(self.energy).map_or_else(
+            || ScalarField::<M>::differential_at(&mean, x, q),
+            |still| still.differential_at(x, q),
+        )
+    }
+
+    #[inline]
+    fn hessian_at(&self, x: &M::Point<f64>, q: &Vector<M>) -> Matrix<M> {
+        let mean = |x: &M::Point<Real>| self.at_real(x);
+        C::still(self.energy).map_or_else(
+            || ScalarField::<M>::hessian_at(&mean, x, q),
+            |still| still.hessian_at(x, q),
+        )
     }
 }
 

@@ -7,6 +7,7 @@ use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
+use metriplectic_equations::Evaluated;
 
 use crate::round_off::bound::of_a_law;
 use crate::run::checked::checked_states;
@@ -142,6 +143,13 @@ pub struct Certificate {
     /// [`NoDissipation`](metriplectic_dynamics::NoDissipation) removes it.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub default_friction: Option<f64>,
+    /// Which fields are evaluated from a recording, and why others are not; empty where none is written to be recorded.
+    /// Serialized as sentences.
+    #[cfg_attr(
+        feature = "serde",
+        serde(skip_serializing_if = "Vec::is_empty", serialize_with = "as_sentences")
+    )]
+    pub evaluated: Vec<Evaluated>,
 }
 
 /// Steps of a method that projects onto the laws; all are zero for another one.
@@ -273,6 +281,11 @@ fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok,
     to.collect_str(&format_args!("{name:?}"))
 }
 
+#[cfg(feature = "serde")]
+fn as_sentences<S: serde::Serializer>(list: &[Evaluated], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(list.iter().map(Evaluated::to_string))
+}
+
 /// A step that was taken, and its size.
 pub(crate) struct StepOf<'a, F: Flow + ?Sized> {
     pub(crate) taken: &'a Taken<F>,
@@ -351,6 +364,7 @@ impl Certificate {
             noise: None,
             projected: flow.is_projected(),
             default_friction: flow.default_friction(x0),
+            evaluated: flow.evaluated(x0),
         }
     }
 

@@ -5,7 +5,7 @@ use std::ops::IndexMut;
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
-use metriplectic_equations::Equations;
+use metriplectic_equations::{Equations, Evaluated};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
@@ -335,6 +335,12 @@ pub trait Flow {
     /// The promise of the model about its entropy.
     fn entropy_law(&self) -> SecondLaw {
         SecondLaw::NoEntropy
+    }
+
+    /// Which fields are evaluated from a recording, as found at a state; nothing where none is written to be recorded.
+    fn evaluated(&self, x: &Element<Self>) -> Vec<Evaluated> {
+        let _ = x;
+        Vec::new()
     }
 
     /// Why each further invariant is conserved.

@@ -4,6 +4,7 @@ use std::cell::Cell;
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_equations::Evaluated;
 use metriplectic_manifolds::PointError;
 
 use super::panicked::{Panicked, caught};
@@ -149,6 +150,10 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
 
     fn entropy_law(&self) -> SecondLaw {
         self.flow.entropy_law()
+    }
+
+    fn evaluated(&self, x: &Entries) -> Vec<Evaluated> {
+        self.flow.evaluated(&self.at(x))
     }
 
     fn kinds(&self) -> Vec<Kind> {

@@ -1,6 +1,6 @@
 //! The energy of a lattice that depends on time: that of the lattice, and one more of each site.
 
-use metriplectic_fields::{Jet1, Real, ScalarField, Space};
+use metriplectic_fields::{Evaluation, Jet1, Real, ScalarField, Space};
 
 use crate::double::Double;
 use crate::gather::Gathers;
@@ -86,6 +86,16 @@ impl<P: Model> Model for AtTime<'_, P> {
     #[inline]
     fn sum(&self, index: usize, site: usize, x: &PointOf<P>) -> Jet1<P::Manifold> {
         self.parts.sum(index, site, x)
+    }
+
+    fn evaluations(
+        &self,
+        site: &PointOf<P>,
+        bond: Option<&PairOf<P>>,
+        put: &mut dyn FnMut(&'static str, Evaluation),
+    ) {
+        self.parts.evaluations(site, bond, put);
+        self.fields.iter().for_each(|_| put("energy in time", Evaluation::Function));
     }
 
     fn has_bracket(&self) -> bool {

@@ -38,6 +38,7 @@ const ONE_FALL: Certificate = Certificate {
     noise: None,
     projected: false,
     default_friction: None,
+    evaluated: Vec::new(),
 };
 
 #[test]

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
+use metriplectic_equations::Evaluated;
 
 use super::{
     Certificate, EventCount, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime,
@@ -91,6 +92,10 @@ impl fmt::Display for Certificate {
             let states = counted(self.checked_states, "state", "states");
             let before = if self.verified_before { "verified before the run; " } else { "" };
             writeln!(f, "model:       {before}its laws were checked at {states}")?;
+        }
+        if !self.evaluated.is_empty() {
+            let fields: Vec<_> = self.evaluated.iter().map(Evaluated::to_string).collect();
+            writeln!(f, "fields:      {}", fields.join("; "))?;
         }
         if self.smallest_step < self.largest_step || self.rejected > 0 {
             write!(

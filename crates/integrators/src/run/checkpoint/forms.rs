@@ -3,6 +3,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
+use metriplectic_equations::Evaluated;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::run::certificate::{
@@ -84,6 +85,9 @@ struct CertificateForm {
     projected: bool,
     #[serde(default, with = "exact")]
     default_friction: Option<f64>,
+    // It is that of the system.
+    #[serde(skip)]
+    evaluated: Vec<Evaluated>,
 }
 
 #[derive(Serialize, Deserialize)]

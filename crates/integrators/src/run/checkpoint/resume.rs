@@ -145,9 +145,9 @@ impl Certificate {
     /// of themselves is theirs.
     fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
         expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
-        let Self { promises, second_law, projected, exchange, noise, .. } = fresh;
+        let Self { promises, second_law, projected, evaluated, exchange, noise, .. } = fresh;
         let mut certificate =
-            Self { promises, second_law, projected, exchange, noise, ..self.clone() };
+            Self { promises, second_law, projected, evaluated, exchange, noise, ..self.clone() };
         for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
             balance.kind = fresh.kind;
         }

@@ -54,7 +54,7 @@ impl Axis {
         let place = |k: f64| k * (step / self.unit);
         let first = (low / (step / self.unit)).ceil();
         let ticks = (0..10).map(|k| first + f64::from(k)).take_while(|&k| place(k) <= high);
-        let digits = |decades: f64| decades.max(0.0) as usize;
+        let digits = |decades: f64| (0_u8..20).take_while(|&k| f64::from(k) < decades).count();
         let plain = (1e-3..1e5).contains(&self.unit) && decade > -7.0;
         let written = |tick: f64| match tick {
             0.0 => "0".to_owned(),

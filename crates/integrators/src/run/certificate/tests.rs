@@ -32,6 +32,7 @@ const ONE_FALL: Certificate = Certificate {
     exchange: None,
     exchange_errors: None,
     jumps: Vec::new(),
+    event_counts: Vec::new(),
     unsure_events: Vec::new(),
     events_at_start: Vec::new(),
     exchanged_in_jumps: Exchanged::NOTHING,

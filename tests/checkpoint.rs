@@ -299,18 +299,18 @@ fn a_file_of_another_version_is_known_by_its_version_alone() {
         (5, r#"{"version":5,"step":0,"start":"0.0","point":["0.0","0.5","0.5"],"balance":{}}"#),
         (6, &first),
         (6, &sixth.to_string()),
-        (10, r#"{"step":{"taken":0},"version":10}"#),
+        (11, r#"{"step":{"taken":0},"version":11}"#),
         (4, r#"{"version":4}"#),
         (6, &format!("[6,{}]", sixth["run"])),
     ] {
-        let error = ResumeError::Version { found: version, expected: 9 };
+        let error = ResumeError::Version { found: version, expected: 10 };
         let older: Checkpoint = serde_json::from_str(text).expect("it is read");
         assert_eq!(WeylMidpoint.resume(&body, &older).err(), Some(error.clone()));
         assert_eq!(older.clone().with_steps(10), Err(error.clone()));
         assert_eq!(older.clone().with_end(10.0), Err(error));
         assert!(older.time().is_nan() && older.point().next().is_none());
     }
-    for text in [r#"{"step":0}"#, r#"{"version":9}"#, "[]", "[9]", r#"[9,"0"]"#, "9"] {
+    for text in [r#"{"step":0}"#, r#"{"version":10}"#, "[]", "[10]", r#"[10,"0"]"#, "10"] {
         assert!(serde_json::from_str::<Checkpoint>(text).is_err(), "{text}");
     }
 }

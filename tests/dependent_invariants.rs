@@ -269,7 +269,7 @@ fn other_methods_keep_a_casimir_of_so5_or_end_in_an_error() {
         largest: f64,
     ) {
         let spans: [Schedule; 2] =
-            [Span::steps(0.1, 500).into(), Span::until(50.0).tolerance(1e-6).into()];
+            [Span::steps(0.1, 300).into(), Span::until(30.0).tolerance(1e-6).into()];
         for (index, span) in spans.into_iter().enumerate() {
             let (trajectory, cause) = match method.run(system, start, span) {
                 Ok(run) => (run, None),

@@ -275,7 +275,7 @@ fn assert_order(name: &str, found: &[(f64, Estimate)], exact: f64, expected: f64
 fn first_passages_have_the_orders_one_half_and_one() {
     let (exact, paths) = (mean_passage(), 20_000_u64);
     println!("exact {exact:.6}");
-    let sizes = [0.08, 0.04, 0.02, 0.01];
+    let sizes = [0.16, 0.08, 0.04, 0.02];
     let flow = RandomFlow(DormandPrince5).seed(21);
     let found = sizes.map(|h| (h, passages!(flow, paths, h, |event| event)));
     assert_order("RandomFlow, ends of steps", &found, exact, 0.5);
@@ -288,8 +288,8 @@ fn first_passages_have_the_orders_one_half_and_one() {
     assert_order("NinomiyaVictoir, bridged", &found, exact, 1.0);
     // Looks inside a step are as good as shorter steps.
     let [seldom, often] =
-        [0.08, 0.01].map(|dt| passages!(splitting, paths, 0.08, |event| event.resolution(dt)));
-    let short = passages!(splitting, paths, 0.01, |event| event);
+        [0.08, 0.02].map(|dt| passages!(splitting, paths, 0.08, |event| event.resolution(dt)));
+    let short = passages!(splitting, paths, 0.02, |event| event);
     println!("{seldom} {often} {short}");
     assert!((often.mean - short.mean).abs() < 0.01 && seldom.mean - short.mean > 0.02);
 }

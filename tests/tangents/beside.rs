@@ -166,7 +166,7 @@ fn lattices_have_tangents() {
     };
     let lattice = ring();
     let start = lattice.points(|site| vector![0.4 + 0.1 * site as f64, -1.0, 0.3]);
-    let span = Span::steps(0.1, 10);
+    let span = Span::steps(0.1, 5);
     compared("lattice, 8", &lattice, DormandPrince8, &start, span);
     compared("lattice, Chebyshev", &lattice, RungeKuttaChebyshev, &start, span);
     compared("lattice, Gauss", &lattice, Gauss::<2>, &start, span);

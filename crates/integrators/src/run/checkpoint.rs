@@ -124,7 +124,7 @@ pub struct Checkpoint(
 
 /// The version of the format that is written and read. Each change of a field is a new version.
 #[cfg(feature = "serde")]
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 impl Checkpoint {
     /// The run that was put down.

@@ -56,6 +56,7 @@ def pull_back(
     chosen: Any,
     start: NDArray[np.float64],
     times: Any,
+    events: list[Any],
     weigh: Callable[[dict[str, Any]], tuple[float, NDArray[np.float64]]],
     along: list[int],
     sizes: list[float],

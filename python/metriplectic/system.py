@@ -671,7 +671,8 @@ class System:
         self, loss: Function, y0: Any, t: float | None = None, *, along: Iterable[str] | None = None,
         sizes: Mapping[str, Any] | None = None, **options: Any,
     ) -> tuple[float, np.ndarray, dict[str, Any]]:
-        """Evaluates a loss over the recorded states of a run, and its derivatives, by the transposed discrete steps.
+        """Evaluates a loss over the recorded states of a run, and its derivatives, by the transposed discrete steps: also where an event jumps
+        or ends the run, whose time depends on the start.
 
         Parameters
         ----------
@@ -698,10 +699,8 @@ class System:
 
     def _pull_back(self, weigh, *, along=None, sizes=None, **options):
         chosen, start, times, found = self._asked(**options)
-        if found:
-            raise ValueError("gradients are those of runs without events; leave `events=` out")
         names, places, widths = self._along(along, sizes)
-        value, start_, rest = _door.pull_back(self._raw, chosen, start, times, weigh, places, widths)
+        value, start_, rest = _door.pull_back(self._raw, chosen, start, times, found, weigh, places, widths)
         parts = self._parted(rest, names)
         return value, start_, {name: float(x) if np.ndim(x) == 0 else x for name, x in parts.items()}
 

@@ -197,3 +197,20 @@ def test_a_program_of_jax_has_the_gradient_of_the_steps():
     )
     assert float(value) == pytest.approx(float(loss(jnp.array(START), 0.3, 1.0)))
     assert np.allclose(np.r_[slopes[0], slopes[1], slopes[2]], exact, atol=1e-7)
+
+
+def test_gradients_go_back_across_events():
+    # From the height q under the gravity g it hits the floor with the momentum −√(2 g q).
+    system, start = ball()(g=2.0), [1.5, 0.0]
+    floor = {"floor": mp.Event(lambda x: x[0], -1, stop=True)}
+    value, along, rest = system.gradient(lambda y: y[-1, 1], start, t=10.0, tol=1e-11, events=floor)
+    assert value == pytest.approx(-np.sqrt(6.0), abs=1e-9)
+    assert along[0] == pytest.approx(-np.sqrt(2.0 / 3.0), abs=1e-8) and rest["g"] == pytest.approx(-np.sqrt(1.5 / 4.0), abs=1e-7)
+    # A bounce that keeps the part e of the speed: at t = 2, from the height 1/2 under the gravity 1, x = e − 1/2 and p = e − 1.
+    bouncing = mp.System(mp.R(2), energy=lambda x: 0.5 * x[1] ** 2 + x[0], poisson="symplectic", parameters={"e": 0.9})
+    wall = {"wall": mp.Event(lambda x: x[0], -1, jump=lambda x, e: np.stack([x[0], -e * x[1]]))}
+    run = bouncing.run([0.5, 0.0], t=2.0, tol=1e-11, events=wall)
+    weights = np.zeros_like(run.y)
+    weights[-1] = [1.0, 3.0]
+    _, parameters = run.vjp(weights)
+    assert parameters["e"] == pytest.approx(4.0, abs=1e-7)

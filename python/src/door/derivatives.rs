@@ -268,7 +268,7 @@ impl Asked {
         flow: &F,
         p: usize,
         names: Option<&Names>,
-        weigh: &Py<PyAny>,
+        (weigh, derivatives): (&Py<PyAny>, Derivatives),
     ) -> PyResult<Gradient>
     where
         F: Smooth,
@@ -277,7 +277,7 @@ impl Asked {
     {
         let x0 = self.begin(flow)?;
         let n = directions(flow);
-        let schedule = self.schedule.clone();
+        let schedule = self.schedule::<F>(derivatives);
         let run = self.method.adjoint(system, x0, schedule).map_err(|error| of_tangent(&error))?;
         let output =
             Output::from_parts((flow, names), run.states(), &[], (run.certificate(), run.ending()));
@@ -358,7 +358,7 @@ type Graded<'py> = (f64, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// Runs a system, and pulls a loss over its states back to the start and the parameters.
 #[pyfunction]
-#[pyo3(signature = (system, chosen, start, times, weigh, along, sizes))]
+#[pyo3(signature = (system, chosen, start, times, events, weigh, along, sizes))]
 #[expect(clippy::too_many_arguments, reason = "they are the arguments of Python")]
 pub(crate) fn pull_back<'py>(
     py: Python<'py>,
@@ -366,12 +366,13 @@ pub(crate) fn pull_back<'py>(
     chosen: Chosen,
     start: PyReadonlyArray1<'_, f64>,
     times: Times,
+    events: Vec<Event<'_>>,
     weigh: Py<PyAny>,
     along: Vec<usize>,
     sizes: Vec<f64>,
 ) -> PyResult<Graded<'py>> {
     let system = system.get();
-    let asked = system.asked(&chosen, &start, &times, &[], None, None)?;
+    let asked = system.asked(&chosen, &start, &times, &events, None, None)?;
     let along = system.along(along, sizes)?;
     let done = caught(|| py.detach(|| system.gradient_of(&asked, &along, &weigh)));
     if let Some(error) = asked.look.take_error() {
@@ -461,7 +462,7 @@ impl RawSystem {
         let names = names.as_ref();
         if let Some(open) = self.open(&self.theta, look)? {
             if p == 0 {
-                return asked.gradient(&open, &open, p, names, weigh);
+                return asked.gradient(&open, &open, p, names, (weigh, Derivatives::Start));
             }
             let kept = Beside::default();
             let build = |theta: &[f64]| {
@@ -469,17 +470,17 @@ impl RawSystem {
                 open.ok_or_else(|| bad("the system is closed"))
             };
             return self.along_parameters(along, &build, &|system| {
-                asked.gradient(system, &**system, p, names, weigh)
+                asked.gradient(system, &**system, p, names, (weigh, Derivatives::Parameters))
             });
         }
         if p == 0 {
             let closed = self.closed(&self.theta, look)?;
-            return asked.gradient(&closed, &closed, p, names, weigh);
+            return asked.gradient(&closed, &closed, p, names, (weigh, Derivatives::Start));
         }
         let kept = Beside::default();
         let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
         self.along_parameters(along, &build, &|system| {
-            asked.gradient(system, &**system, p, names, weigh)
+            asked.gradient(system, &**system, p, names, (weigh, Derivatives::Parameters))
         })
     }
 

@@ -265,7 +265,20 @@ impl Watched {
         if let Some(dt) = self.resolution {
             watched = watched.resolution(dt);
         }
-        let Some(map) = self.jump.clone() else { return watched.into() };
+        let Some(map) = self.jump.clone() else {
+            let function = self.function.clone();
+            return match derivatives {
+                Derivatives::Start if self.stop > 0 => {
+                    watched.differentiable(move |t, x: &Vec<Real>| function.outputs(x, t)[0]).into()
+                }
+                Derivatives::Parameters if self.stop > 0 => watched
+                    .differentiable(move |t, (x, theta): &(Vec<Real>, Vec<Real>)| {
+                        function.outputs_at(x, t, theta)[0]
+                    })
+                    .into(),
+                _ => watched.into(),
+            };
+        };
         let narrow = map.clone();
         let mut jumping = watched.jump(move |t, x: &P| x.with(&narrow.outputs(x.entries(), t)));
         if let Some(temperature) = self.heat_at {

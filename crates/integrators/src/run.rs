@@ -8,6 +8,7 @@ pub mod controller;
 mod corners;
 mod course;
 mod departure;
+mod direction;
 pub(crate) mod ending;
 pub(crate) mod error;
 pub mod event;

@@ -4,13 +4,14 @@ use metriplectic_dynamics::SecondLaw;
 
 use crate::run::certificate::{Certificate, InvariantBalance};
 use crate::run::controller::{Rule, StepSize};
+use crate::run::direction::direction;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::event::LastNumber;
 use crate::run::judged::Judged;
 use crate::run::least_sizes::least_sizes;
 use crate::run::progress::Progress;
-use crate::run::schedule::{Schedule, Size, direction};
+use crate::run::schedule::{Schedule, Size};
 use crate::run::sequence::Frozen;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;

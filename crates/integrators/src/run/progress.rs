@@ -2,9 +2,9 @@
 
 use crate::run::controller::{Pace, StepSize};
 use crate::run::corners::Corners;
+use crate::run::direction::direction;
 use crate::run::ending::Ending;
 use crate::run::judged::Judged;
-use crate::run::schedule::direction;
 use crate::step::{Scales, Vector};
 
 #[cfg(feature = "serde")]

@@ -3,6 +3,7 @@
 use crate::run::adaptive::Adaptive;
 use crate::run::controller::Rule;
 use crate::run::corners::Corners;
+use crate::run::direction::direction;
 use crate::run::requests::Requests;
 use crate::run::sequence::{Frozen, StepSequence};
 use crate::run::span_error::{SpanError, check_step_size, check_steps};
@@ -35,11 +36,6 @@ pub struct Schedule {
     pub(crate) corners: Corners,
     /// The steps of another run.
     pub(crate) frozen: Frozen,
-}
-
-/// The sign of the time of a run, and of its steps.
-pub(crate) const fn direction(backward: bool) -> f64 {
-    if backward { -1.0 } else { 1.0 }
 }
 
 /// How large the steps of a course are.

@@ -1,6 +1,6 @@
 //! Spans that cannot be run.
 
-use crate::run::schedule::direction;
+use crate::run::direction::direction;
 use crate::step::type_names::short;
 
 /// Advice on a run back in time.

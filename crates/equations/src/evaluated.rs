@@ -8,7 +8,7 @@ use std::fmt;
 pub struct Evaluated {
     /// The name of the field, such as `energy`.
     pub field: &'static str,
-    /// What its derivatives come from.
+    /// Its origin of derivatives.
     pub from: Evaluation,
 }
 
@@ -42,7 +42,7 @@ impl fmt::Display for Evaluated {
     }
 }
 
-/// What the derivatives of a field come from.
+/// The origin of the derivatives of a field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Evaluation {

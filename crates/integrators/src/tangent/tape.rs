@@ -41,7 +41,7 @@ pub(super) struct TapedStep<F: Flow> {
 
 /// The end of a step that was kept.
 pub(super) enum End {
-    /// That of its last part.
+    /// The end of its last part.
     Step,
     /// An event at which the state jumps or the run ends, with the matrix from the frame of the last part to that of the event.
     Event { crossing: Crossing, turn: Option<DMatrix<f64>>, stops: bool },

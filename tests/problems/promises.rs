@@ -268,9 +268,8 @@ where
     let adaptive = run(&schedules.adaptive)?;
     let mut uncounted = adaptive.certificate().clone();
     uncounted.event_counts.clear();
-    broken.expect(&uncounted == plain.certificate(), || {
-        "outputs and events change steps".to_owned()
-    });
+    broken
+        .expect(&uncounted == plain.certificate(), || "outputs and events change steps".to_owned());
     let outputs = recorded(&adaptive);
     broken.laws(&outputs, has_second_law, scale);
     broken.events(adaptive.events(), &outputs, schedules.half);

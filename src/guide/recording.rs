@@ -57,7 +57,7 @@
 //! | `Gauss::<3>` | 748,105 | 618,209 |
 //! | `Radau::<2>` | 965,198 | 834,429 |
 //!
-//! The [certificate](crate::Certificate::evaluated) of a run says which fields are evaluated from a recording, and why others are not.
+//! The [certificate](crate::integrators::Certificate::evaluated) of a run says which fields are evaluated from a recording, and why others are not.
 //! A recorded field takes the faster one of closure and tape by itself. A sweep needs room for a few numbers for each
 //! operation, and each thread keeps it from one evaluation to the next.
 //!

@@ -82,6 +82,7 @@ const WORDS: &[(&str, &str)] = &[
     ("`at_most`", "`at_most=`"),
     ("`.resolution(dt)`", "`resolution=dt` of the event"),
     ("by `.scale`", "by `scale=`"),
+    ("`.backward()`", "`backward=True`"),
     ("`SymmetricItohAbe`", "\"symmetric-itoh-abe\""),
     ("`ItohAbe`", "\"itoh-abe\""),
     ("`MeanValue`", "\"mean-value\""),

@@ -57,14 +57,15 @@ impl<T> Bath<T, ()> {
     ///
     /// ```
     /// use metriplectic_dynamics::exchange::{Bath, Contact};
-    /// use metriplectic_dynamics::{Metriplectic, System};
     /// use metriplectic_fields::Real;
-    /// use metriplectic_manifolds::{Euclidean, Product, Rotations};
     /// use nalgebra::{Matrix3, Vector3, Vector6};
-    /// # use metriplectic_dynamics::exchange::Exchange;
     /// // On SO(3) × R³: the isotropic friction of the momenta alone, directions 3 to 5.
-    /// let drag = Bath::at(300.0).friction(|_: Real, _: &(Matrix3<Real>, Vector3<Real>), _: &Vector6<Real>| {
-    ///     [3, 4, 5].map(|k| Contact { rate: 0.1.into(), along: Vector6::ith(k, 1.0.into()) })
+    /// type State = (Matrix3<Real>, Vector3<Real>);
+    /// let drag = Bath::at(300.0).friction(|_: Real, _: &State, _: &Vector6<Real>| {
+    ///     [3, 4, 5].map(|k| Contact {
+    ///         rate: Real::from(0.1),
+    ///         along: Vector6::ith(k, Real::from(1.0)),
+    ///     })
     /// });
     /// ```
     pub fn isotropic(self, rate: f64) -> Bath<T, Isotropic> {

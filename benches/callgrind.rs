@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-/// Whether there is valgrind.
+/// Looks for valgrind.
 pub(crate) fn is_there() -> bool {
     Command::new("valgrind").arg("--version").stdout(Stdio::null()).status().is_ok()
 }

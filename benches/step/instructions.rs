@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use metriplectic_studies::LogLog;
 
-use crate::Row;
+use crate::{Row, callgrind};
 
 /// A count that differs by more than this fraction from the snapshot is an error.
 const ALLOWED: f64 = 0.03;
@@ -23,22 +22,12 @@ pub(crate) fn count(rows: &[Row], name: &str, steps: usize) {
 
 /// The instructions that callgrind counts in a run of one row.
 fn collected(name: &str, steps: usize) -> Option<f64> {
-    let program = std::env::current_exe().ok()?;
-    let output = Command::new("valgrind")
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(program)
-        .args(["--row", name, &steps.to_string()])
-        .output()
-        .ok()?;
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    let line = text.lines().find(|line| line.contains("Collected"))?;
-    line.rsplit(' ').next()?.parse().ok()
+    callgrind::collected(&["--row", name, &steps.to_string()])
 }
 
 /// Counts every row and compares the counts with the snapshot, or writes it.
 pub(crate) fn compare(rows: &[Row], bless: bool) {
-    let valgrind = Command::new("valgrind").arg("--version").stdout(Stdio::null()).status();
-    if valgrind.is_err() {
+    if !callgrind::is_there() {
         println!("valgrind is not installed: the instructions are not counted");
         return;
     }

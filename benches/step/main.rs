@@ -20,6 +20,8 @@ use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::{DiscreteGradient, Element, Flow, Schedule, StateSpace, StepStart};
 use metriplectic::prelude::*;
 
+#[path = "../callgrind.rs"]
+mod callgrind;
 #[path = "../../tests/models/chain.rs"]
 mod chain;
 mod chart_midpoint;

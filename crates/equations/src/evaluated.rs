@@ -1,4 +1,4 @@
-//! Where the derivatives of a field come from.
+//! The origin of the derivatives of a field.
 
 use std::fmt;
 
@@ -49,7 +49,7 @@ pub enum Evaluation {
     /// The function as it was given, which is not written to be recorded.
     #[default]
     Function,
-    /// Its recording, by sweeps.
+    /// The tape of its recording.
     Tape,
     /// The function for gradients, although there is a recording that agrees with it: with so few variables the function is faster.
     FewVariables(usize),

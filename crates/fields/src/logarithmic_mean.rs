@@ -13,7 +13,7 @@ use crate::series::arctangent_series;
 /// its affinity `A = ln(p/q)`, the rate of mass action is `p − q = Λ A`, so that `Λ` is the conductance of the reaction
 /// (Mielke 2011; Maas 2011).
 ///
-/// Where `p` and `q` differ by less than a factor of two it is evaluated as `m r/artanh r` with `m = (p + q)/2` and
+/// If `p` and `q` differ by less than a factor of two it is evaluated as `m r/artanh r` with `m = (p + q)/2` and
 /// `r = (p − q)/(p + q)`, by the series of `artanh`, so that it and its derivatives are right at `p = q`. `Λ(p, 0) = 0`, where the
 /// derivative is infinite: there, and of negative numbers, the derivatives or the value are not a number, and a run says so by an error.
 ///

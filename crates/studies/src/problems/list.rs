@@ -10,7 +10,7 @@ use metriplectic_manifolds::{
     Canonical, Cayley, ChartMidpoint, Euclidean, Exponential, HalfLine, LieDual, Metric, Product,
     Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
 };
-use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector4, Vector6, vector};
+use nalgebra::{Matrix2, Matrix3, Matrix6, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
 
 use super::{Constants, Problem, Study};
@@ -58,12 +58,29 @@ fn body_energy(p: &Vector3<Real>) -> Real {
     p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5
 }
 
+fn heavy_energy((r, p): &(Matrix3<Real>, Vector3<Real>)) -> Real {
+    p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(2) * (1.0 / 6.0) + r.m33 * 0.7 + r.m31 * 0.2
+}
+
 fn rotation_energy(r: &Matrix3<Real>) -> Real {
     r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5
 }
 
 fn rotation_entropy(r: &Matrix3<Real>) -> Real {
     r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25
+}
+
+/// A field with a constant. Its type names no study: a closure in a function of a study would be compiled with each.
+fn plus<X>(f: fn(&X) -> Real, constant: f64) -> impl Fn(&X) -> Real + Copy {
+    move |x| f(x) + constant
+}
+
+/// A metric of SO(3) in the frame of the body, which may depend on the attitude.
+fn inertia(full: Matrix3<f64>, leaning: f64) -> impl Fn(&Matrix3<Real>) -> Matrix3<Real> + Copy {
+    move |r| {
+        let lean = r.column(2).into_owned();
+        full.cast::<Real>() + lean * lean.transpose() * Real::from(leaning)
+    }
 }
 
 /// A point of norm 1 off every axis.
@@ -168,10 +185,10 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         Vector3::zeros(),
         [(vector![1.0, -0.3, -0.8], 2.0)],
         System::on(LieDual::so3())
-            .energy(move |p: &Vector3<Real>| body_energy(p) + h)
-            .entropy(move |p: &Vector3<Real>| p.norm_squared() * 0.5 + s)
+            .energy(plus(body_energy, h))
+            .entropy(plus(|p: &Vector3<Real>| p.norm_squared() * 0.5, s))
     );
-    let sphere = || System::on(Sphere::<2>::round()).energy(move |x: &Vector3<Real>| top(x) + h);
+    let sphere = || System::on(Sphere::<2>::round()).energy(plus(top, h));
     let diagonal = Vector3::from_element(3.0_f64.sqrt().recip());
     visit!(
         problem("spinning top", "S²", 5.0),
@@ -187,8 +204,8 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         Vector3::z(),
         [(vector![-0.4, 1.1], 4.0)],
         System::on(Sphere::<2>::round())
-            .energy(move |x: &Vector3<Real>| hill(x) + h)
-            .entropy(move |x: &Vector3<Real>| tilt(x) + s),
+            .energy(plus(hill, h))
+            .entropy(plus(tilt, s)),
         "projection" by Projection
     );
     visit!(
@@ -198,7 +215,7 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         [(vector![0.3, 1.0], 8.0)],
         sphere()
             .bracket(AreaForm)
-            .entropy(move |x: &Vector3<Real>| hill(x) + s)
+            .entropy(plus(hill, s))
             .second_law(SecondLaw::Published),
         "projection" by Projection
     );
@@ -209,8 +226,8 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         [(vector![-1.1, -1.0, 0.1], 8.0)],
         System::on(Sphere::<3>::round())
             .bracket(Nambu::default())
-            .energy(move |x: &Vector4<Real>| bumpy(x) + h)
-            .entropy(move |x: &Vector4<Real>| slope(x) + s),
+            .energy(plus(bumpy, h))
+            .entropy(plus(slope, s)),
         "projection" by Projection
     );
     visit!(
@@ -220,8 +237,8 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         [ (vector![0.4, 0.0, -1.2, 0.6, 0.2], 4.0), (vector![-0.1, -0.2, -0.7, 1.8, 0.2], 8.0)],
         System::on(Sphere::<5>::round())
             .bracket(Nambu::default().and(first_twist).and(second_twist))
-            .energy(move |x: &Vector6<Real>| bumpy(x) + h)
-            .entropy(move |x: &Vector6<Real>| slope(x) + s),
+            .energy(plus(bumpy, h))
+            .entropy(plus(slope, s)),
         "projection" by Projection
     );
     visit!(
@@ -231,8 +248,8 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
         [(vector![1.1, -1.2, 1.1], 2.0)],
         System::on(Rotations::bi_invariant())
             .bracket(Nambu::default())
-            .energy(move |r: &Matrix3<Real>| rotation_energy(r) + h)
-            .entropy(move |r: &Matrix3<Real>| rotation_entropy(r) + s),
+            .energy(plus(rotation_energy, h))
+            .entropy(plus(rotation_entropy, s)),
         "Cayley" by Cayley
     );
 }
@@ -240,7 +257,7 @@ pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
 /// Metrics from closures, with numerical geodesics.
 pub(super) fn closures(study: &mut impl Study, constants: Constants) {
     let Constants { energy: h, entropy: s } = constants;
-    let ambient = |x: &Vector3<Real>| {
+    let ambient: fn(&Vector3<Real>) -> Matrix3<Real> = |x| {
         let mut g = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>();
         g[(0, 1)] = x.z * 0.2;
         g[(1, 0)] = x.z * 0.2;
@@ -248,8 +265,8 @@ pub(super) fn closures(study: &mut impl Study, constants: Constants) {
     };
     let system = System::on(Sphere::<2>::round())
         .metric(Metric::field(ambient))
-        .energy(move |x: &Vector3<Real>| top(x) + h)
-        .entropy(move |x: &Vector3<Real>| hill(x) + s)
+        .energy(plus(top, h))
+        .entropy(plus(hill, s))
         .build()
         .expect("a problem is a system");
     let start = Vector3::from_element(3.0_f64.sqrt().recip());
@@ -262,20 +279,16 @@ pub(super) fn closures(study: &mut impl Study, constants: Constants) {
     // One closure for both, and so one type.
     let diagonal = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]);
     let full = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
-    for (metric, inertia, leaning, strides) in [
+    for (metric, full, leaning, strides) in [
         ("left-invariant", full, 0.0, [(vector![-0.2, 1.4, -0.3], 2.0)]),
         ("depends on R", diagonal, 0.5, [(vector![-0.2, 1.4, -0.3], 2.0)]),
     ] {
-        let body = move |r: &Matrix3<Real>| {
-            let lean = r.column(2).into_owned();
-            inertia.cast::<Real>() + lean * lean.transpose() * Real::from(leaning)
-        };
         let system = System::on(Rotations)
-            .metric(Metric::field(body))
+            .metric(Metric::field(inertia(full, leaning)))
             .bracket(Nambu::default())
             .dissipation(Scaled(0.1, MetricDissipation))
-            .energy(move |r: &Matrix3<Real>| rotation_energy(r) + h)
-            .entropy(move |r: &Matrix3<Real>| rotation_entropy(r) + s)
+            .energy(plus(rotation_energy, h))
+            .entropy(plus(rotation_entropy, s))
             .build()
             .expect("a problem is a system");
         let (name, manifold, strides) = ("Nambu", "SO(3)", strides.to_vec());
@@ -284,14 +297,14 @@ pub(super) fn closures(study: &mut impl Study, constants: Constants) {
         all(study, &problem, "Cayley", Cayley);
     }
 
-    let leaning = |q: &Vector2<Real>| {
+    let leaning: fn(&Vector2<Real>) -> Matrix2<Real> = |q| {
         let across = q.x.sin() * 0.4;
         Matrix2::new(q.y.powi(2) + 1.0, across, across, q.x.powi(2) * 0.5 + 1.0)
     };
     let system = System::on(Euclidean::<2>)
         .metric(Metric::field(leaning))
         .bracket(AreaForm)
-        .energy(move |q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1 + h)
+        .energy(plus(|q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1, h))
         .build()
         .expect("a problem is a system");
     let strides = vec![(vector![0.0, 0.55], 2.0)];
@@ -300,7 +313,7 @@ pub(super) fn closures(study: &mut impl Study, constants: Constants) {
     let problem = Problem { name, manifold, metric, system, start, rest, time, strides };
     with(study, &problem, &[BY_THE_CHART]);
 
-    let leaning = |q: &Vector3<Real>| {
+    let leaning: fn(&Vector3<Real>) -> Matrix3<Real> = |q| {
         let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
         Matrix3::identity() + wave * wave.transpose() * Real::from(0.4)
     };
@@ -308,8 +321,8 @@ pub(super) fn closures(study: &mut impl Study, constants: Constants) {
         .metric(Metric::field(leaning))
         .bracket(Nambu::default())
         .dissipation(Scaled(0.1, MetricDissipation))
-        .energy(move |q: &Vector3<Real>| bumpy(q) + h)
-        .entropy(move |q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1 + s)
+        .energy(plus(bumpy, h))
+        .entropy(plus(|q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1, s))
         .build()
         .expect("a problem is a system");
     let strides = vec![(vector![-1.1, 0.8, 0.9], 2.0)];
@@ -325,8 +338,8 @@ pub(super) fn products(study: &mut impl Study, constants: Constants) {
     // H = h(n) + e(s) with the entropy itself as the second factor: a spin in a bath.
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
-        .energy(move |(n, s): &(Vector3<Real>, Vector1<Real>)| top(n) + s.x.exp() + h)
-        .entropy(move |(_, bath): &(Vector3<Real>, Vector1<Real>)| bath.x + s)
+        .energy(plus(|(n, s): &(Vector3<Real>, Vector1<Real>)| top(n) + s.x.exp(), h))
+        .entropy(plus(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x, s))
         .build()
         .expect("a problem is a system");
     let start = (Vector3::from_element(3.0_f64.sqrt().recip()), Vector1::new(0.1));
@@ -338,8 +351,8 @@ pub(super) fn products(study: &mut impl Study, constants: Constants) {
     let system = System::on(Product(Sphere::<2>::round(), HalfLine))
         .metric((Canonical, Canonical))
         .bracket((AreaForm, Zero))
-        .energy(move |(n, e): &(Vector3<Real>, Vector1<Real>)| top(n) + e.x + h)
-        .entropy(move |(_, e): &(Vector3<Real>, Vector1<Real>)| e.x.ln() + s)
+        .energy(plus(|(n, e): &(Vector3<Real>, Vector1<Real>)| top(n) + e.x, h))
+        .entropy(plus(|(_, e): &(Vector3<Real>, Vector1<Real>)| e.x.ln(), s))
         .build()
         .expect("a problem is a system");
     let start = (Vector3::new(FRAC_1_SQRT_2, 0.5, 0.5), Vector1::new(0.8));
@@ -348,35 +361,27 @@ pub(super) fn products(study: &mut impl Study, constants: Constants) {
     let rest = (Vector3::z(), Vector1::new(0.8));
     geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
-    let energy = move |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
-        p.x.powi(2) * 0.5
-            + p.y.powi(2) * 0.25
-            + p.z.powi(2) * (1.0 / 6.0)
-            + r.m33 * 0.7
-            + r.m31 * 0.2
-            + h
-    };
     let start = (attitude(), vector![0.4, -0.6, 0.8]);
     let rest = (attitude(), Vector3::zeros());
     let system = System::on(Product(Rotations, Euclidean::<3>))
         .bracket(Symplectic)
-        .energy(energy)
+        .energy(plus(heavy_energy, h))
         .build()
         .expect("a problem is a system");
     let strides = vec![(vector![-0.9, 0.8, 1.0, 0.6, 1.4, 0.9], 1.0)];
     let (name, manifold) = ("heavy body", "SO(3) × R³");
     geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
-    let full = |(r, _): &(Matrix3<Real>, Vector3<Real>)| {
-        let mut g = nalgebra::Matrix6::<Real>::identity();
+    let full: fn(&(Matrix3<Real>, Vector3<Real>)) -> Matrix6<Real> = |(r, _)| {
+        let mut g = Matrix6::identity();
         let lean = Vector6::new(r.m13, r.m23, r.m33, Real::from(0.5), r.m31, Real::from(0.0));
         g += lean * lean.transpose() * Real::from(0.3);
         g
     };
     let system = System::on(Product(Rotations, Euclidean::<3>))
         .metric(Metric::field(full))
-        .energy(energy)
-        .entropy(move |(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3 + s)
+        .energy(plus(heavy_energy, h))
+        .entropy(plus(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3, s))
         .build()
         .expect("a problem is a system");
     let away = vector![0.2, -0.3, 1.5, -1.3, -0.9, 0.3];

@@ -20,11 +20,19 @@ pub(crate) fn each<W: Send, R: Send>(
     work: impl ExactSizeIterator<Item = W>,
     f: impl Fn(W) -> R + Sync,
 ) -> Vec<R> {
-    // Plain loops: what iterators make of them would be compiled for every loop of every lattice.
     let mut pieces = Vec::with_capacity(work.len());
     for work in work {
         pieces.push(Mutex::new(Piece::Work(work)));
     }
+    results(pieces, &f)
+}
+
+/// The results of `f` for pieces of work. The function is behind a pointer, so that this is compiled once for all functions of such
+/// pieces; and it has plain loops, because what iterators make of them would be compiled for each kind of piece.
+fn results<W: Send, R: Send>(
+    pieces: Vec<Mutex<Piece<W, R>>>,
+    f: &(dyn Fn(W) -> R + Sync),
+) -> Vec<R> {
     on_all_threads(pieces.len(), &|k| {
         if let Ok(mut piece) = pieces[k].lock()
             && let Piece::Work(work) = std::mem::replace(&mut *piece, Piece::Turning)
@@ -108,6 +116,15 @@ pub(crate) fn fill<T: Send, R: Send>(
     per_site: usize,
     f: impl Fn(Range<usize>, &mut [T]) -> R + Sync,
 ) -> Vec<R> {
+    fill_by(out, per_site, &f)
+}
+
+/// [`fill`] by a function behind a pointer.
+fn fill_by<T: Send, R: Send>(
+    out: &mut [T],
+    per_site: usize,
+    f: &(dyn Fn(Range<usize>, &mut [T]) -> R + Sync),
+) -> Vec<R> {
     let count = out.len() / per_site;
     let work = out.chunks_mut(CHUNK * per_site).enumerate();
     each(work, |(chunk, out)| f(sites(chunk, count), out))
@@ -115,6 +132,11 @@ pub(crate) fn fill<T: Send, R: Send>(
 
 /// The results of `f` for each chunk of `count` sites.
 pub(crate) fn map<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
+    map_by(count, &f)
+}
+
+/// [`map`] by a function behind a pointer.
+fn map_by<R: Send>(count: usize, f: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
     each(0..count.div_ceil(CHUNK), |chunk| f(sites(chunk, count)))
 }
 

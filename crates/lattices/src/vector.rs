@@ -93,7 +93,7 @@ impl SiteVector {
         }
     }
 
-    fn filled(&self, f: impl Fn(usize, &mut [f64]) + Sync) -> Self {
+    fn filled(&self, f: &(dyn Fn(usize, &mut [f64]) + Sync)) -> Self {
         let mut numbers = self.pool.numbers(self.sites * self.stride);
         parallel::fill(&mut numbers, self.stride, |sites, out| f(sites.start * self.stride, out));
         Self::each(self.sites, self.stride, numbers)
@@ -118,25 +118,48 @@ impl SiteVector {
     /// largest site.
     fn norms<const K: usize, const M: usize>(
         vectors: [&Self; K],
-        f: impl Fn([f64; K]) -> [f64; M] + Sync,
+        f: Rows<'_, K, [f64; M]>,
     ) -> [f64; M] {
-        let parts = parallel::map(vectors[0].sites, |sites| Self::squares(vectors, &f, sites));
+        let parts = parallel::map(vectors[0].sites, |sites| Self::squares(vectors, f, sites));
         let mean = (vectors[0].stride as f64).recip();
         // Roots and products with a positive number keep the order of the sums.
-        parts.into_iter().fold([0.0; M], both_larger).map(|sum| (sum * mean).sqrt())
+        let mut norms = parts.into_iter().fold([0.0; M], both_larger);
+        norms.iter_mut().for_each(|sum| *sum = (*sum * mean).sqrt());
+        norms
     }
 
     /// The largest sums of squares of these sites.
     fn squares<const K: usize, const M: usize>(
         vectors: [&Self; K],
-        f: &impl Fn([f64; K]) -> [f64; M],
+        f: Rows<'_, K, [f64; M]>,
         sites: Range<usize>,
     ) -> [f64; M] {
         let stride = vectors[0].stride;
         let mut largest = [0.0; M];
-        let mut tiles: [Room<f64>; K] = std::array::from_fn(|_| Room::of(stride, 0.0));
         let mut room = Room::of(stride, [0.0; M]);
+        Self::in_blocks(vectors, sites, &mut |slices, block| {
+            let out = room.items(block.len() * stride);
+            f(slices, out);
+            for site in out.chunks_exact(stride) {
+                let mut sums = [0.0; M];
+                for numbers in site {
+                    sums.iter_mut().zip(numbers).for_each(|(sum, r)| *sum += r * r);
+                }
+                largest = both_larger(largest, sums);
+            }
+        });
+        largest
+    }
+
+    /// Visits the sites of a range block by block, with the numbers of each vector from the block on.
+    fn in_blocks<const K: usize>(
+        vectors: [&Self; K],
+        sites: Range<usize>,
+        visit: &mut dyn FnMut([&[f64]; K], Range<usize>),
+    ) {
+        let stride = vectors[0].stride;
         let length = stride * blocks::sites_of(stride).min(sites.len());
+        let mut tiles: [Room<f64>; K] = std::array::from_fn(|_| Room::of(stride, 0.0));
         let mut same = [&[][..]; K];
         for ((tile, same), v) in tiles.iter_mut().zip(&mut same).zip(vectors) {
             if let Numbers::Same(numbers) = &v.numbers {
@@ -148,22 +171,37 @@ impl SiteVector {
             }
         }
         for block in blocks::blocks(sites, stride) {
-            let (start, count) = (block.start * stride, block.len() * stride);
             let mut slices = same;
             for (slice, v) in slices.iter_mut().zip(vectors) {
-                *slice = v.slice().map_or(*slice, |numbers| &numbers[start..]);
+                *slice = v.slice().map_or(*slice, |numbers| &numbers[block.start * stride..]);
             }
-            let out = room.items(count);
-            each(slices, out, f);
-            for site in out.chunks_exact(stride) {
-                let mut sums = [0.0; M];
-                for numbers in site {
-                    sums.iter_mut().zip(numbers).for_each(|(sum, r)| *sum += r * r);
-                }
-                largest = both_larger(largest, sums);
-            }
+            visit(slices, block);
         }
-        largest
+    }
+
+    /// A function of the numbers that vectors have at the same place.
+    fn zipped<const K: usize>(vectors: [&Self; K], f: Rows<'_, K, f64>) -> Self {
+        let first = vectors[0];
+        let mut slices = [&[][..]; K];
+        if vectors.iter().all(|v| v.slice().is_none()) {
+            for (slice, v) in slices.iter_mut().zip(vectors) {
+                *slice = v.strided().0;
+            }
+            let mut numbers = vec![0.0; first.stride];
+            f(slices, &mut numbers);
+            return Self::same(first.sites, numbers, &first.pool);
+        }
+        if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some())
+        {
+            return first.filled(&|start, out| f(slices.map(|slice| &slice[start..]), out));
+        }
+        let stride = first.stride;
+        first.filled(&|start, out| {
+            let sites = start / stride..(start + out.len()) / stride;
+            Self::in_blocks(vectors, sites, &mut |slices, block| {
+                f(slices, &mut out[block.start * stride - start..block.end * stride - start]);
+            });
+        })
     }
 
     /// The root mean square of the ratios `v_i/s_i` at each site.
@@ -185,13 +223,26 @@ fn both_larger<const M: usize>(mut most: [f64; M], part: [f64; M]) -> [f64; M] {
     most
 }
 
+/// A function of the numbers that `K` vectors have at the same place, for a row of places. It is behind a pointer, so that what is
+/// done with all sites is compiled once, and not with each function.
+type Rows<'a, const K: usize, R> = &'a (dyn Fn([&[f64]; K], &mut [R]) + Sync);
+
 /// Writes a function of numbers that stand at the same place. The places it writes to are none of those it reads, which the
-/// compiler knows of arguments alone.
+/// compiler knows of arguments alone. Loops over indices, of which the compiler makes less than of iterators.
 #[inline(always)]
-fn each<const K: usize, R>(numbers: [&[f64]; K], out: &mut [R], f: impl Fn([f64; K]) -> R) {
-    let numbers = numbers.map(|numbers| &numbers[..out.len()]);
+fn each<const K: usize, R>(mut rows: [&[f64]; K], out: &mut [R], f: impl Fn([f64; K]) -> R) {
+    let (count, mut k) = (out.len(), 0);
+    while k < K {
+        rows[k] = &rows[k][..count];
+        k += 1;
+    }
     for (i, out) in out.iter_mut().enumerate() {
-        *out = f(numbers.map(|numbers| numbers[i]));
+        let (mut numbers, mut k) = ([0.0; K], 0);
+        while k < K {
+            numbers[k] = rows[k][i];
+            k += 1;
+        }
+        *out = f(numbers);
     }
 }
 
@@ -235,24 +286,7 @@ impl Vector for SiteVector {
     }
 
     fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
-        let first = vectors[0];
-        if vectors.iter().all(|v| v.slice().is_none()) {
-            let numbers = (0..first.stride).map(|k| f(vectors.map(|v| v.get(k))));
-            return Self::same(first.sites, numbers.collect(), &first.pool);
-        }
-        let mut slices = [&[][..]; K];
-        if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some())
-        {
-            return first.filled(|start, out| each(slices.map(|slice| &slice[start..]), out, &f));
-        }
-        let (strided, stride) = (vectors.map(Self::strided), first.stride);
-        first.filled(|start, out| {
-            for (site, out) in (start / stride..).zip(out.chunks_exact_mut(stride)) {
-                for (k, out) in out.iter_mut().enumerate() {
-                    *out = f(strided.map(|(numbers, stride)| numbers[site * stride + k]));
-                }
-            }
-        })
+        Self::zipped(vectors, &|rows, out| each(rows, out, &f))
     }
 
     fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
@@ -269,7 +303,7 @@ impl Vector for SiteVector {
             };
             return Self::zip([&(1..count).fold(start, add)], |[sum]| h * sum);
         };
-        first.filled(|start, out| combine(out, start, h, &terms))
+        first.filled(&|start, out| combine(out, start, h, &terms))
     }
 
     /// The largest site, and the root mean square over the directions of a site. A mean over the sites would allow
@@ -280,7 +314,7 @@ impl Vector for SiteVector {
     }
 
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
-        let [norm] = Self::norms(vectors, |numbers| [f(numbers)]);
+        let [norm] = Self::norms(vectors, &|rows, out| each(rows, out, |numbers| [f(numbers)]));
         norm
     }
 
@@ -293,7 +327,10 @@ impl Vector for SiteVector {
         let mean = (vectors[0].stride as f64).recip();
         (0..sites.div_ceil(CHUNK)).all(|chunk| {
             let sites = parallel::sites(chunk, sites);
-            let [sum] = Self::squares(vectors, &|numbers| [f(numbers)], sites);
+            let row = |rows: [&[f64]; K], out: &mut [[f64; 1]]| {
+                each(rows, out, |numbers| [f(numbers)]);
+            };
+            let [sum] = Self::squares(vectors, &row, sites);
             (sum * mean).sqrt() < bound
         })
     }
@@ -302,7 +339,7 @@ impl Vector for SiteVector {
         vectors: [&Self; K],
         f: impl Fn([f64; K]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        Self::norms(vectors, f)
+        Self::norms(vectors, &|rows, out| each(rows, out, &f))
     }
 
     fn sites(&self) -> Option<usize> {

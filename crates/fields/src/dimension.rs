@@ -40,9 +40,18 @@ impl<const N: usize> Dimension for Const<N> {
     type Array<T: Copy + Debug + Send + Sync> = [T; N];
 
     #[inline]
-    fn array<T: Copy + Debug + Send + Sync>(f: impl FnMut(usize) -> T) -> [T; N] {
+    fn array<T: Copy + Debug + Send + Sync>(mut f: impl FnMut(usize) -> T) -> [T; N] {
         // Most systems have no further invariants: their closures are not compiled.
-        if const { N == 0 } { nothing() } else { std::array::from_fn(f) }
+        if const { N == 0 } {
+            return nothing();
+        }
+        // A loop over indices, of which the compiler makes less than of `std::array::from_fn`.
+        let (mut values, mut i) = ([f(0); N], 1);
+        while i < N {
+            values[i] = f(i);
+            i += 1;
+        }
+        values
     }
 }
 

@@ -15,7 +15,7 @@ use metriplectic_fields::Column;
 use crate::error::LatticeError;
 use crate::graph::Graph;
 use crate::neighbours::{Edge, Edges, Neighbours, Node, Shared};
-use crate::parallel::{self, CHUNK};
+use crate::parallel::{self, CHUNK, Merge};
 
 /// The chunks of a graph, or some of them.
 #[derive(Debug)]
@@ -230,10 +230,15 @@ impl Layout {
 
     /// The results of the chunks of all parts in one, by the tree of the whole graph.
     pub(crate) fn sum<R: Shared>(&self, parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
+        self.sum_by(parts, &merge)
+    }
+
+    /// [`sum`](Self::sum) by a function behind a pointer.
+    fn sum_by<R: Shared>(&self, parts: Vec<R>, merge: Merge<'_, R>) -> Option<R> {
         if self.neighbours.count() == 1 {
             return parallel::tree(parts, merge);
         }
-        let nodes = parallel::nodes(parallel::leaves(self.first[1], parts), &merge);
+        let nodes = parallel::nodes(parallel::leaves(self.first[1], parts), merge);
         let listed = nodes.iter().map(|Node { level, index, sum }| Node {
             level: *level,
             index: *index,
@@ -245,7 +250,7 @@ impl Layout {
             .into_iter()
             .map(|Node { level, index, sum }| Node { level, index, sum: form.of_list(&sum) })
             .collect();
-        parallel::top(parallel::nodes(all.into_iter(), &merge), merge)
+        parallel::top(parallel::nodes(all, merge), merge)
     }
 
     /// Returns whether it has all of the graph.
@@ -296,19 +301,23 @@ impl Layout {
         let results = parallel::each(pieces, work);
         self.neighbours.exchange(&self.crossings, width, slots);
         if width > 0 {
-            let slots = &*slots;
-            let pieces = self.chunks.iter().zip(out.chunks_mut(CHUNK * stride));
-            parallel::each(pieces, |(chunk, out)| {
-                for &Arrival { site, slot } in &self.arrivals[chunk.arrivals.clone()] {
-                    let from = slot as usize * width;
-                    let to = site as usize % CHUNK * stride;
-                    for k in 0..width {
-                        out[to + k] += slots[from + k];
-                    }
-                }
-            });
+            self.add_arrivals(out, stride, slots, width);
         }
         results
+    }
+
+    /// Adds to the numbers of the sites, `stride` at each, those that bonds give them, `width` in a slot.
+    fn add_arrivals(&self, out: &mut [f64], stride: usize, slots: &[f64], width: usize) {
+        let pieces = self.chunks.iter().zip(out.chunks_mut(CHUNK * stride));
+        parallel::each(pieces, |(chunk, out)| {
+            for &Arrival { site, slot } in &self.arrivals[chunk.arrivals.clone()] {
+                let from = slot as usize * width;
+                let to = site as usize % CHUNK * stride;
+                for k in 0..width {
+                    out[to + k] += slots[from + k];
+                }
+            }
+        });
     }
 }
 

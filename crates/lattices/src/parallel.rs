@@ -68,20 +68,21 @@ fn on_all_threads(count: usize, f: &(dyn Fn(usize) + Sync)) {
 
 /// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged.
 /// `None` without chunks.
-pub(crate) fn tree<R>(parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
-    top(nodes(leaves(0, parts), &merge), &merge)
+pub(crate) fn tree<R>(parts: Vec<R>, merge: Merge<'_, R>) -> Option<R> {
+    top(nodes(leaves(0, parts), merge), merge)
 }
 
+/// Merges two neighbours. Behind a pointer, so that a tree is compiled once for each kind of result.
+pub(crate) type Merge<'a, R> = &'a dyn Fn(R, R) -> R;
+
 /// The results of the chunks from `first` on.
-pub(crate) fn leaves<R>(first: usize, parts: Vec<R>) -> impl ExactSizeIterator<Item = Node<R>> {
-    parts.into_iter().enumerate().map(move |(k, sum)| Node { level: 0, index: first + k, sum })
+pub(crate) fn leaves<R>(first: usize, parts: Vec<R>) -> Vec<Node<R>> {
+    let leaf = |(k, sum)| Node { level: 0, index: first + k, sum };
+    parts.into_iter().enumerate().map(leaf).collect()
 }
 
 /// The largest nodes of the tree that a row of nodes has.
-pub(crate) fn nodes<R>(
-    row: impl ExactSizeIterator<Item = Node<R>>,
-    merge: impl Fn(R, R) -> R,
-) -> Vec<Node<R>> {
+pub(crate) fn nodes<R>(row: Vec<Node<R>>, merge: Merge<'_, R>) -> Vec<Node<R>> {
     // Before the first node without a left neighbour levels rise, and behind it they fall.
     let levels = row.len().checked_ilog2().unwrap_or(0) as usize + 1;
     let mut nodes: Vec<Node<R>> = Vec::with_capacity(2 * levels);
@@ -99,7 +100,7 @@ pub(crate) fn nodes<R>(
 }
 
 /// The whole sum, from the largest nodes of all chunks.
-pub(crate) fn top<R>(nodes: Vec<Node<R>>, merge: impl Fn(R, R) -> R) -> Option<R> {
+pub(crate) fn top<R>(nodes: Vec<Node<R>>, merge: Merge<'_, R>) -> Option<R> {
     let mut nodes = nodes.into_iter().rev();
     let last = nodes.next()?.sum;
     Some(nodes.fold(last, |right, left| merge(left.sum, right)))
@@ -145,13 +146,13 @@ mod tests {
     use super::*;
 
     fn sum(parts: &[f64]) -> f64 {
-        tree(parts.to_vec(), |a, b| a + b).unwrap_or(0.0)
+        tree(parts.to_vec(), &|a, b| a + b).unwrap_or(0.0)
     }
 
     #[test]
     fn processes_that_own_any_rows_of_chunks_have_the_bits_of_one_process() {
         let parts: Vec<f64> = (0..100).map(|k| 1.0 / (3.0 + f64::from(k))).collect();
-        let (whole, plus) = (sum(&parts), |a, b| a + b);
+        let (whole, plus): (f64, Merge<'_, f64>) = (sum(&parts), &|a, b| a + b);
         for length in [1, 2, 4, 8, 16, 32, 64, 128] {
             // Where they own whole subtrees, one number is enough.
             let owned: Vec<f64> = parts.chunks(length).map(sum).collect();
@@ -164,13 +165,13 @@ mod tests {
                 row
             });
             let owned: Vec<_> = owned.collect();
-            let total = top(nodes(owned.into_iter(), plus), plus).expect("there are chunks");
+            let total = top(nodes(owned, plus), plus).expect("there are chunks");
             assert_eq!(total.to_bits(), whole.to_bits(), "{length} chunks each");
         }
         // Sums of blocks that are no subtrees have other bits, and so has a sum in a row.
         let others = parts.chunks(7).map(sum).collect::<Vec<_>>();
         assert_ne!(sum(&others).to_bits(), whole.to_bits());
         assert_ne!(parts.iter().sum::<f64>().to_bits(), whole.to_bits());
-        assert!(tree(Vec::<f64>::new(), |a, b| a + b).is_none());
+        assert!(tree(Vec::new(), plus).is_none());
     }
 }

@@ -279,7 +279,9 @@ impl Vector for SiteVector {
     fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         match &self.numbers {
             Numbers::Same(numbers) => {
-                Self::same(self.sites, numbers.iter().map(|&x| f(x)).collect(), &self.pool)
+                let mut numbers = numbers.clone();
+                numbers.iter_mut().for_each(|x| *x = f(*x));
+                Self::same(self.sites, numbers, &self.pool)
             }
             Numbers::Each(numbers) => self.with(|i| f(numbers[i])),
         }

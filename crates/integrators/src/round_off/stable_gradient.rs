@@ -8,6 +8,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
 use super::bound::SUMMED;
+use crate::step::both;
 
 /// A field along one path: the data of a discrete gradient at `f64`.
 ///
@@ -85,7 +86,7 @@ fn safer<M: Space>(
     rounding: f64,
 ) -> (f64, f64) {
     let middle = middle.as_ref().map_or_else(base, |z| f.at_real(z).eps1);
-    let slopes = [x, y].map(|x| {
+    let slopes = both([x, y], |x| {
         let f = f.at_real(x);
         [f.eps1, f.eps1eps2]
     });

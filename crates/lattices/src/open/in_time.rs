@@ -147,7 +147,7 @@ pub(super) fn sum<P: Model>(
         }
         sum
     });
-    let sum = parallel::tree(sums, |mut a, b| {
+    let sum = parallel::tree(sums, &|mut a, b| {
         a.merge(b);
         a
     });

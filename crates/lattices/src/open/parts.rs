@@ -142,7 +142,7 @@ impl<P: Model> OpenLattice<P> {
                 sums.push((power, production));
                 exchanged.velocities.extend(velocities);
             }
-            let sum = parallel::tree(sums, |mut a, b| {
+            let sum = parallel::tree(sums, &|mut a, b| {
                 a.0.merge(b.0);
                 a.1.merge(b.1);
                 a

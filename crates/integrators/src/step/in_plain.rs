@@ -254,6 +254,44 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
     }
 }
 
+/// The start of a step in types, at its state.
+fn start_in_types<'s, F: Written>(
+    flow: &'s F,
+    x: &'s Element<F>,
+    start: &StepStart<'_, PlainFlow<'_>>,
+) -> StepStart<'s, F> {
+    StepStart {
+        flow,
+        x,
+        time: start.time,
+        values: typed::<F>(&start.values),
+        reference: typed::<F>(&start.reference),
+        allowed: start.allowed.as_ref().map(F::vector),
+    }
+}
+
+/// The ends of a step in types, with the laws there.
+struct EndsInTypes<F: Flow> {
+    x: Element<F>,
+    end: Element<F>,
+    before: Laws<F::Numbers>,
+    after: Laws<F::Numbers>,
+    reference: Laws<F::Numbers>,
+}
+
+impl<F: Written> EndsInTypes<F> {
+    fn of(flow: &F, step: &StepEnds<'_, PlainFlow<'_>>) -> Self {
+        let [x, end] = both([step.x, step.end], |x| F::read(flow.layout(), x));
+        let [before, after] = both(step.values, typed::<F>);
+        Self { x, end, before, after, reference: typed::<F>(step.reference) }
+    }
+
+    const fn step<'s>(&'s self, flow: &'s F, h: f64) -> StepEnds<'s, F> {
+        let Self { x, end, before, after, reference } = self;
+        StepEnds { flow, x, end, h, values: [before, after], reference }
+    }
+}
+
 /// A method that takes its steps in types, as one of flows in plain numbers.
 pub(crate) struct MethodInTypes<'a, F, M> {
     pub(crate) method: M,
@@ -269,38 +307,6 @@ impl<F: Written, M: Stepper<F>> MethodInTypes<'_, F, M> {
     #[inline]
     fn at(&self, x: &[f64]) -> Element<F> {
         F::read(self.flow.layout(), x)
-    }
-
-    /// Calls `f` with the start of a step in types.
-    #[inline]
-    fn from<T>(
-        &self,
-        start: &StepStart<'_, PlainFlow<'_>>,
-        f: impl FnOnce(&StepStart<'_, F>) -> T,
-    ) -> T {
-        let StepStart { x, time, values, reference, allowed, .. } = start;
-        f(&StepStart {
-            flow: self.flow,
-            x: &self.at(x),
-            time: *time,
-            values: typed::<F>(values),
-            reference: typed::<F>(reference),
-            allowed: allowed.as_ref().map(F::vector),
-        })
-    }
-
-    /// Calls `f` with the ends of a step in types.
-    #[inline]
-    fn between_ends<T>(
-        &self,
-        &StepEnds { x, end, h, values, reference, .. }: &StepEnds<'_, PlainFlow<'_>>,
-        f: impl FnOnce(&StepEnds<'_, F>) -> T,
-    ) -> T {
-        let [x, end] = both([x, end], |x| self.at(x));
-        let [before, after] = both(values, typed::<F>);
-        let reference = &typed::<F>(reference);
-        let (flow, values) = (self.flow, [&before, &after]);
-        f(&StepEnds { flow, x: &x, end: &end, h, values, reference })
     }
 
     #[inline]
@@ -348,8 +354,11 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         sizes: [f64; 2],
         memory: &PlainMemory,
     ) -> Option<Entries> {
-        let inside =
-            || self.from(start, |start| self.method.on_path(start, sizes, memory.after_a_step()?));
+        let inside = || {
+            let x = self.at(start.x);
+            let start = start_in_types(self.flow, &x, start);
+            self.method.on_path(&start, sizes, memory.after_a_step()?)
+        };
         let inside =
             if const { F::CATCHES_PANICS } { caught(inside).ok().flatten() } else { inside() };
         inside.map(|x| F::write(&x))
@@ -366,9 +375,9 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
             let function = |x: &Element<F>| function(&F::write(x));
             let (from, function) = (&self.at(from), &function);
             let excursion = Excursion { from, fractions, values, function };
-            self.from(start, |start| {
-                self.method.excursion(start, h, memory.after_a_step()?, &excursion)
-            })
+            let x = self.at(start.x);
+            let start = start_in_types(self.flow, &x, start);
+            self.method.excursion(&start, h, memory.after_a_step()?, &excursion)
         };
         if const { F::CATCHES_PANICS } { caught(drawn).ok().flatten() } else { drawn() }
     }
@@ -385,7 +394,8 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         memory: &mut PlainMemory,
     ) -> Result<Taken<PlainFlow<'a>>, StepError> {
         let step = |memory: &mut PlainMemory| {
-            self.from(start, |start| self.method.step(start, h, memory.of()))
+            let x = self.at(start.x);
+            self.method.step(&start_in_types(self.flow, &x, start), h, memory.of())
         };
         if const { !F::CATCHES_PANICS } {
             return step(memory).map(Self::taken);
@@ -407,7 +417,10 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         h: f64,
         memory: &mut PlainMemory,
     ) -> Result<Taken<PlainFlow<'a>>, Refusal> {
-        let mut attempt = || self.from(start, |start| self.method.attempt(start, h, memory.of()));
+        let mut attempt = || {
+            let x = self.at(start.x);
+            self.method.attempt(&start_in_types(self.flow, &x, start), h, memory.of())
+        };
         if const { !F::CATCHES_PANICS } {
             return attempt().map(Self::taken);
         }
@@ -426,9 +439,9 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         norm: &dyn Fn(&Directions) -> f64,
     ) -> Option<f64> {
         let error = || {
-            self.between_ends(step, |step| {
-                self.method.error(step, memory.after_a_step()?, |error| norm(&F::directions(error)))
-            })
+            let (memory, ends) = (memory.after_a_step()?, EndsInTypes::of(self.flow, step));
+            let norm = |error: &F::Vector| norm(&F::directions(error));
+            self.method.error(&ends.step(self.flow, step.h), memory, norm)
         };
         if const { F::CATCHES_PANICS } { caught(error).ok().flatten() } else { error() }
     }
@@ -443,8 +456,10 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         if const { M::HAS_DEFAULT_BETWEEN && !F::CATCHES_PANICS } {
             return dense::between_in_numbers(step, self.method.promises(self.flow), theta);
         }
-        let mut inside =
-            || self.between_ends(step, |step| self.method.between(step, memory.of(), theta));
+        let mut inside = || {
+            let ends = EndsInTypes::of(self.flow, step);
+            self.method.between(&ends.step(self.flow, step.h), memory.of(), theta)
+        };
         let inside =
             if const { F::CATCHES_PANICS } { caught(inside).ok().flatten() } else { inside() };
         inside.map(|x| F::write(&x))

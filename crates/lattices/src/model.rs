@@ -247,7 +247,7 @@ where
         visit: impl FnMut(Onsager<[Vector<M>; 2]>),
     ) {
         let data = self.data.bonds.of(bond);
-        let [w, s] = [0, 1].map(|law| [first[law], second[law]]);
+        let (w, s) = ([first[0], second[0]], [first[1], second[1]]);
         self.friction.bonds.each(&BondState { x, w, s, data }, visit);
     }
 }

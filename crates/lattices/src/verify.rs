@@ -500,18 +500,18 @@ impl<P: Model> Trial<'_, P> {
         let size = energy.value.abs().max(self.mean[0]);
         let slope = Slope::of(&energy.df, &u);
         let at = (place, tried);
-        quotient(ENERGY, at, (size, slope), |t| parts.values(site, &moved(t))[0], laws)?;
+        quotient(ENERGY, at, (size, slope), &|t| parts.values(site, &moved(t))[0], laws)?;
         if P::ENTROPY {
             let entropy = parts.entropy(site, x);
             let size = entropy.value.abs().max(self.mean[1]);
             let slope = Slope::of(&entropy.df, &u);
-            quotient(ENTROPY, at, (size, slope), |t| parts.values(site, &moved(t))[1], laws)?;
+            quotient(ENTROPY, at, (size, slope), &|t| parts.values(site, &moved(t))[1], laws)?;
         }
         for k in 0..P::SUMS {
             let sum = parts.sum(k, site, x);
             let slope = Slope::of(&sum.df, &u);
             let value = |t| parts.sum(k, site, &moved(t)).value;
-            quotient(SUM, at, (sum.value, slope), value, laws)?;
+            quotient(SUM, at, (sum.value, slope), &value, laws)?;
         }
         Ok(())
     }
@@ -538,7 +538,7 @@ impl<P: Model> Trial<'_, P> {
             |t: f64| lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t)));
         let jet = lattice.parts.bond_energy(bond, &x);
         let (size, at) = (jet.value.abs().max(self.mean[0]), (lattice.place_of(bond), self.tried));
-        quotient(ENERGY, at, (size, Slope::of(&jet.df, &u)), value, laws)
+        quotient(ENERGY, at, (size, Slope::of(&jet.df, &u)), &value, laws)
     }
 
     /// The derivative of the totals along one random direction.
@@ -559,11 +559,11 @@ impl<P: Model> Trial<'_, P> {
             }
         }
         let between = |ends: [Total; 2]| move |t: f64| ends[usize::from(t < 0.0)].sum.value();
-        quotient(ENERGY, at, (h0.size, slopes[0]), between([h1, h0]), laws)?;
+        quotient(ENERGY, at, (h0.size, slopes[0]), &between([h1, h0]), laws)?;
         if !P::ENTROPY {
             return Ok(());
         }
-        quotient(ENTROPY, at, (s0.size, slopes[1]), between([s1, s0]), laws)
+        quotient(ENTROPY, at, (s0.size, slopes[1]), &between([s1, s0]), laws)
     }
 
     /// The rates of the conserved sums.
@@ -651,7 +651,7 @@ fn quotient(
     (what, law): (&'static str, &'static str),
     (place, tried): (Place, Tried),
     (size, slope): (f64, Slope),
-    value: impl Fn(f64) -> f64,
+    value: &dyn Fn(f64) -> f64,
     laws: &mut Laws,
 ) -> Result<(), LatticeError> {
     let over = |step: f64| [value(step), value(-step)];

@@ -66,16 +66,23 @@ fn spread<M: Manifold + Times<M>, G: Gather<M>>(
     df: &mut Vector<Product<M, M>>,
 ) {
     if G::PRESENT {
-        let [i, j] = ends.map(|site| sums[2 * site as usize + 1]);
-        *df += gather.weight(pair).df * (i + j);
+        let sum = |site: u32| sums[2 * site as usize + 1];
+        *df += gather.weight(pair).df * (sum(ends[0]) + sum(ends[1]));
     }
+}
+
+/// The points of a bond.
+#[inline]
+fn pair_at<T: Clone>(x: &[T], [i, j]: [u32; 2]) -> (T, T) {
+    (x[i as usize].clone(), x[j as usize].clone())
 }
 
 /// The parts of a differential on a bond that belong to its two sites.
 #[inline]
 pub(crate) fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
     let n = dimension::<P>();
-    [0, n].map(|start| VectorOf::<P>::from_index(|k| df[start + k]))
+    let half = |start| VectorOf::<P>::from_index(|k| df[start + k]);
+    [half(0), half(n)]
 }
 
 /// Returns whether two vectors have equal bits.
@@ -119,7 +126,7 @@ impl<P: Model> Lattice<P> {
             }
             for bond in part.bonds.clone() {
                 let ends = bonds[bond];
-                let pair = ends.map(|site| x[site as usize].clone()).into();
+                let pair = pair_at(x, ends);
                 let phi = SVector::<f64, 1>::from_index(|_| gather.weight(&pair).value);
                 part.add(ends, &[[phi, phi]]);
             }
@@ -224,7 +231,7 @@ impl<P: Model> Lattice<P> {
             let none = given == Given::Nothing || totals.entropy_differs;
             for bond in if none { 0..0 } else { part.bonds.clone() } {
                 let ends = bonds[bond];
-                let pair = ends.map(|site| x[site as usize].clone()).into();
+                let pair = pair_at(x, ends);
                 let mut jet = self.parts.bond_energy(bond, &pair);
                 spread(&gathers.energy, &pair, energy_sums, ends, &mut jet.df);
                 let energy = halves::<P>(&jet.df);

@@ -32,7 +32,8 @@ impl<P: Model> Lattice<P> {
         (x, all): (&[PointOf<P>], AtSites<'_, P>),
         mut visit: impl FnMut([Both<'_, P>; 2], Onsager<[VectorOf<P>; 2]>),
     ) {
-        let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
+        let [i, j] = self.layout.bonds()[bond];
+        let (i, j) = (i as usize, j as usize);
         let ([wi, si], [wj, sj]) = (all.at(i), all.at(j));
         let both = [[&wi, &si], [&wj, &sj]];
         self.parts.bond_friction(bond, [&x[i], &x[j]], both, |term| visit(both, term));

@@ -61,7 +61,7 @@ impl<P: Model> Trial<'_, P> {
             let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
             let phi = gather.weight(&x);
             let (slope, at) = (Slope::of(&phi.df, &u), (lattice.place_of(bond), self.tried));
-            quotient(of, at, (phi.value, slope), |t| gather.weight(&moved(t)).value, laws)?;
+            quotient(of, at, (phi.value, slope), &|t| gather.weight(&moved(t)).value, laws)?;
         }
         for site in sites {
             let (x, rho) = (&self.y[site], sums[2 * site]);
@@ -70,10 +70,10 @@ impl<P: Model> Trial<'_, P> {
             let moved = |t: f64| P::Manifold::chart(x, &(u * t));
             let g = gather.embedded(x, rho);
             let value = |t| gather.embedded(&moved(t), rho).jet.value;
-            quotient(of, at, (g.jet.value, Slope::of(&g.jet.df, &u)), value, laws)?;
+            quotient(of, at, (g.jet.value, Slope::of(&g.jet.df, &u)), &value, laws)?;
             let sum = g.along_rho * rho;
             let value = |t: f64| gather.embedded(x, rho * (1.0 + t)).jet.value;
-            quotient(of, at, (g.jet.value, Slope { sum, terms: sum.abs() }), value, laws)?;
+            quotient(of, at, (g.jet.value, Slope { sum, terms: sum.abs() }), &value, laws)?;
         }
         Ok(())
     }

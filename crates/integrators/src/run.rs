@@ -1,6 +1,7 @@
 //! Everything that a user does with a run of any method.
 
 mod adaptive;
+mod advance;
 pub mod certificate;
 mod checked;
 pub mod checkpoint;

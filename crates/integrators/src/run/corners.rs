@@ -146,7 +146,7 @@ pub(crate) struct Fixed {
 /// A step of one size in a run with these corners, in parts between them.
 pub(super) fn step<F: Flow + ?Sized>(
     method: &mut dyn AnyStepper<F>,
-    start: &StepStart<'_, F>,
+    start: StepStart<'_, F>,
     Fixed { h, end }: Fixed,
     corners: &Corners,
 ) -> Result<Taken<F>, StepError> {
@@ -180,7 +180,7 @@ pub(super) fn step<F: Flow + ?Sized>(
             reference: reference.clone(),
             allowed: start.allowed.clone(),
         };
-        let mut taken = method.step(&from, size)?;
+        let mut taken = method.step(from, size)?;
         taken.evidence.shortest_part = size;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {

@@ -1,4 +1,4 @@
-//! A run without its loop: all of it but the method, its memory, and what each step needs of the system.
+//! A run without its method.
 
 use metriplectic_dynamics::SecondLaw;
 
@@ -40,8 +40,7 @@ impl Said {
 }
 
 /// All of a run but the method and its memory. The flow is any one with these states and numbers
-/// ([`AnyFlow`](crate::step::AnyFlow)), so that starts, outputs, events, jumps and checkpoints are compiled once for
-/// each space. The loop over the steps knows its flow.
+/// ([`AnyFlow`](crate::step::AnyFlow)), so that a run is compiled once for each space.
 pub(super) struct Course<'a, F: Flow + ?Sized> {
     pub(super) flow: &'a F,
     pub(super) rule: Rule,

@@ -48,7 +48,7 @@ impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// ```
     pub fn at(&mut self, time: f64) -> Option<State<F::Space>> {
         let Self { method, flow, memory, course } = self;
-        course.at(time, &mut Stepping { method, flow: *flow, memory })
+        course.at(time, &mut Stepping { method, flow: *flow, memory, tried: None })
     }
 
     /// The states at the [times asked for](crate::Watch::output_at) in the last step, as far as the iterator has not
@@ -155,7 +155,7 @@ impl<F: Flow + ?Sized> Path<F::Space> for OnPath<'_, '_, F> {
         if in_parts {
             return None;
         }
-        self.method.excursion(&self.course.start_of_last(), h, excursion)
+        self.method.excursion(self.course.start_of_last(), h, excursion)
     }
 }
 
@@ -238,9 +238,10 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             let start =
                 StepStart { flow: *flow, x, time: times[0], values, reference, allowed: None };
             let size = Fixed { h: theta * h, end: times[0] + theta * (times[1] - times[0]) };
-            let mut taken = None;
+            let (mut start, mut taken) = (Some(start), None);
             method.afresh(&mut |method| {
-                taken = corners::step(method, &start, size, corners).ok();
+                let start = start.take();
+                taken = start.and_then(|start| corners::step(method, start, size, corners).ok());
             });
             let taken = taken?;
             let inside = at(taken.x);
@@ -386,7 +387,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         if *in_parts {
             return None;
         }
-        let point = method.on_path(&self.start_of_last(), [*h, theta])?;
+        let point = method.on_path(self.start_of_last(), [*h, theta])?;
         let time = along([state.time, self.state.time], theta);
         let point = self.flow.clocked(&point, time).unwrap_or(point);
         let Laws { energy, entropy, .. } = self.flow.laws(&point);

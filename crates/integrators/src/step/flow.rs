@@ -166,8 +166,7 @@ pub trait FlowVisitor<F: Flow>: Sized {
     }
 }
 
-/// A flow of which nothing is known but what its states and its numbers are. The parts of a run that are not in its loop
-/// are compiled for it, and so once for each space.
+/// A flow of which nothing is known but what its states and its numbers are. A run is compiled for it, and so once for each space.
 pub(crate) type AnyFlow<'a, F> = dyn Flow<Space = <F as Flow>::Space, Numbers = <F as Flow>::Numbers, Vector = <F as Flow>::Vector>
     + 'a;
 

@@ -143,16 +143,25 @@ pub(crate) struct Fixed {
     pub(crate) end: f64,
 }
 
-/// A step of one size in a run with these corners, in parts between them.
+/// A step of one size in a run with these corners.
+#[inline]
 pub(super) fn step<F: Flow + ?Sized>(
+    method: &mut dyn AnyStepper<F>,
+    start: StepStart<'_, F>,
+    size: Fixed,
+    corners: &Corners,
+) -> Result<Taken<F>, StepError> {
+    if corners.is_empty() { method.step(start, size.h) } else { cut(method, start, size, corners) }
+}
+
+/// A step in parts between corners.
+#[cold]
+fn cut<F: Flow + ?Sized>(
     method: &mut dyn AnyStepper<F>,
     start: StepStart<'_, F>,
     Fixed { h, end }: Fixed,
     corners: &Corners,
 ) -> Result<Taken<F>, StepError> {
-    if corners.is_empty() {
-        return method.step(start, h);
-    }
     let flow = start.flow;
     let (mut time, mut reference) = (start.time, start.reference.clone());
     let (mut x, mut values) = (start.x.clone(), start.values.clone());

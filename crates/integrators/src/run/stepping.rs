@@ -175,6 +175,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Steppin
 }
 
 /// The start of a step of the flow itself.
+#[inline]
 fn start_of<'s, F: Flow + ?Sized>(
     flow: &'s F,
     StepStart { x, time, values, reference, allowed, .. }: StepStart<'s, AnyFlow<'_, F>>,
@@ -183,6 +184,7 @@ fn start_of<'s, F: Flow + ?Sized>(
 }
 
 /// The ends of a step of the flow itself.
+#[inline]
 fn ends_of<'s, F: Flow + ?Sized>(
     flow: &'s F,
     &StepEnds { x, end, h, values, reference, .. }: &StepEnds<'s, AnyFlow<'_, F>>,
@@ -191,6 +193,7 @@ fn ends_of<'s, F: Flow + ?Sized>(
 }
 
 /// A step of any flow with these states and numbers.
+#[inline]
 fn taken<'a, F: Flow + ?Sized>(
     Taken { x, values, evidence, effort }: Taken<F>,
 ) -> Taken<AnyFlow<'a, F>> {

@@ -304,6 +304,9 @@ fn error_of(start: &StepStart<'_, PlainFlow<'_>>, panicked: Panicked) -> StepErr
 }
 
 impl<F: Written, M: Stepper<F>> MethodInTypes<'_, F, M> {
+    /// Whether it is a method of this library without random numbers, so that its answers about a path are not compiled.
+    const HAS_NO_PATH: bool = M::IS_EXPLICIT || M::IS_IMPLICIT;
+
     #[inline]
     fn at(&self, x: &[f64]) -> Element<F> {
         F::read(self.flow.layout(), x)
@@ -354,6 +357,9 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         sizes: [f64; 2],
         memory: &PlainMemory,
     ) -> Option<Entries> {
+        if const { Self::HAS_NO_PATH } {
+            return None;
+        }
         let inside = || {
             let x = self.at(start.x);
             let start = start_in_types(self.flow, &x, start);
@@ -371,6 +377,9 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         memory: &PlainMemory,
         &Excursion { from, fractions, values, function }: &Excursion<'_, Entries>,
     ) -> Option<bool> {
+        if const { Self::HAS_NO_PATH } {
+            return None;
+        }
         let drawn = || {
             let function = |x: &Element<F>| function(&F::write(x));
             let (from, function) = (&self.at(from), &function);

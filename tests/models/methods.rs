@@ -65,27 +65,23 @@ impl<R> fmt::Debug for Any<R> {
     }
 }
 
-macro_rules! each_explicit {
-    ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
-        match ($self, $both) {
-            (Explicit::Kutta3, $memory) => {
-                let $method = &KUTTA;
-                $call
-            }
-            (Explicit::Order5, $memory) => {
-                let $method = &DormandPrince5;
-                $call
-            }
-            (Explicit::Order8, $memory) => {
-                let $method = &DormandPrince8;
-                $call
-            }
-            (Explicit::Chebyshev, $memory) => {
-                let $method = &RungeKuttaChebyshev;
-                $call
-            }
+impl Explicit {
+    /// The method of its coefficients, which has the bits of the method of its name: one type, so that its steps are compiled once.
+    const fn method(self) -> ExplicitRungeKutta {
+        match self {
+            Self::Kutta3 => KUTTA,
+            Self::Order5 => ExplicitRungeKutta::new(DormandPrince5::TABLEAU),
+            Self::Order8 => ExplicitRungeKutta::new(DormandPrince8::TABLEAU),
+            Self::Chebyshev => ExplicitRungeKutta::new(RungeKuttaChebyshev::TABLEAU),
         }
-    };
+    }
+}
+
+macro_rules! each_explicit {
+    ($self:expr, $memory_of:expr, |$method:ident, $memory:ident| $call:expr) => {{
+        let ($method, $memory) = (&$self.method(), $memory_of);
+        $call
+    }};
 }
 
 impl<F: StageFlow> Stepper<F> for Explicit {

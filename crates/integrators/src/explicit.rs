@@ -230,8 +230,11 @@ impl DormandPrince5 {
 }
 
 impl RungeKuttaChebyshev {
+    /// The coefficients, which each step makes for its number of stages.
+    pub const TABLEAU: &'static Tableau = &CHEBYSHEV;
+
     const fn tableau(self) -> &'static Tableau {
-        &CHEBYSHEV
+        Self::TABLEAU
     }
 }
 

@@ -265,6 +265,7 @@ macro_rules! beside_a_clock {
             .energy_in_time(|t: Real, x: &Vector2<Real>| x.norm_squared() * 0.5 + (t * 3.0).sin())
             .build()
             .unwrap()
+            .erased()
     };
 }
 
@@ -281,6 +282,7 @@ macro_rules! spring {
             })
             .build()
             .unwrap()
+            .erased()
     };
 }
 
@@ -457,7 +459,8 @@ fn a_state_at_rest_leaves_when_its_drive_begins() {
             (x.y * x.y + stretched * stretched) * 0.5
         })
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     // q = (t − 1) − sin(t − 1).
     let exact = 2.0 - 2.0_f64.sin();
     macro_rules! leaves {

@@ -208,7 +208,8 @@ fn a_protocol_that_jumps_is_resolved_by_small_steps() {
             (x.y * x.y + x.x * x.x * stiffness) * 0.5
         })
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     let [q, p, rest] = [JUMP.cos(), -JUMP.sin(), 2.0 * (1.0 - JUMP)];
     let exact =
         vector![q * rest.cos() + 0.5 * p * rest.sin(), p * rest.cos() - 2.0 * q * rest.sin()];
@@ -284,7 +285,8 @@ fn stages_from_rest_lose_little_of_their_order() {
             x.y * x.y * 0.5 - x.x.cos() - x.x * t.sin() * 0.5
         })
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     let end = |run: &Trajectory<OpenSpace<Euclidean<2>>>| run.last().point.x;
     let fine = Span::until(2.0).tolerance(1e-13);
     let exact = end(&DormandPrince8.run(&spring, spring.start(vector![0.0, 0.0]), fine).unwrap());

@@ -278,8 +278,7 @@ fn outputs_and_events_lie_along_a_run_that_goes_back() {
     for _ in 0..5 {
         steps.advance().unwrap();
     }
-    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-    let read: Checkpoint = serde_json::from_str(&text).unwrap();
+    let read = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
     let resumed = DormandPrince8.resume(&oscillator, &read).unwrap().watching(asked()).unwrap();
     let resumed = resumed.run().unwrap();
     assert_eq!(resumed.last(), run.last());

@@ -222,8 +222,7 @@ fn a_system_of_any_size_needs_no_more_than_a_flow() {
     for _ in 0..100 {
         steps.advance().unwrap();
     }
-    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
     let resumed = ExplicitMidpoint.resume(&system, &checkpoint).unwrap().run().unwrap();
     assert_eq!(resumed.last(), whole.last());
     assert_eq!(resumed.certificate(), whole.certificate());

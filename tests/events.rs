@@ -209,8 +209,7 @@ fn an_event_that_stops_ends_the_run_there() {
     // A stop within the last step of a run, through a file.
     let span = Span::steps(0.1, 16).event("node", |x: &Plane| x.x).stop();
     let run = WeylMidpoint.run(&system, START, span).unwrap();
-    let text = serde_json::to_string(run.checkpoint()).unwrap();
-    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let checkpoint = metriplectic_studies::checkpoints::reread(run.checkpoint());
     let resumed = WeylMidpoint.resume(&system, &checkpoint).unwrap();
     assert_eq!(resumed.ending(), Some(Ending::Event { index: 0 }));
     let json = serde_json::to_value(&run).unwrap();
@@ -287,8 +286,7 @@ fn an_event_across_a_nan_where_a_run_was_put_down_is_found() {
             seen.extend(steps.take_events());
         }
         // Through a file, and put down once more before the events are said again.
-        let text = serde_json::to_string(&steps.checkpoint()).expect("it is written");
-        let read: Checkpoint = serde_json::from_str(&text).expect("it is read");
+        let read = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
         let again = DormandPrince5.resume(&system, &read).expect("it is resumed").checkpoint();
         assert_eq!(again, read);
         let resumed = DormandPrince5.resume(&system, &again).expect("it is resumed");
@@ -358,8 +356,7 @@ where
         for _ in 0..put_down {
             steps.advance().expect("it runs");
         }
-        let text = serde_json::to_string(&steps.checkpoint()).expect("it is written");
-        let read: Checkpoint = serde_json::from_str(&text).expect("it is read");
+        let read = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
         let resumed = method.clone().resume(system, &read).expect("it is resumed");
         let resumed = resumed.watching(span.clone()).expect("it watches").run().expect("it runs");
         assert_eq!(resumed.last(), whole.last(), "after {put_down} steps");

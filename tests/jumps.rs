@@ -348,8 +348,7 @@ fn a_run_that_is_resumed_jumps_as_before() {
                     after_a_jump += usize::from(jumped);
                     // Right after a jump, and at some other steps.
                     if jumped || count % 17 == 0 {
-                        let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-                        let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+                        let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
                         let resumed = $method.resume(&$system, &checkpoint).unwrap();
                         let resumed = resumed.watching(schedule()).unwrap().run().unwrap();
                         assert_eq!(resumed.last(), whole.last());

@@ -300,8 +300,7 @@ fn runs_have_outputs_events_rest_and_checkpoints() {
     while steps.state().time < 2.0 {
         steps.advance().unwrap();
     }
-    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
     let resumed = DormandPrince8.resume(&lattice, &checkpoint).unwrap().run().unwrap();
     assert_eq!(resumed.last(), whole.last());
     assert_eq!(resumed.certificate(), whole.certificate());

@@ -202,8 +202,7 @@ fn outputs_jumps_and_checkpoints_of_an_open_lattice() {
     for _ in 0..20 {
         steps.advance().unwrap();
     }
-    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
     let resumed = DormandPrince5.resume(&rod, &checkpoint).unwrap();
     let resumed = resumed.watching(schedule()).unwrap().run().unwrap();
     assert_eq!(resumed.last(), whole.last());

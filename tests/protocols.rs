@@ -373,8 +373,7 @@ fn a_run_of_ones_own_that_is_put_down_goes_on_with_the_same_bits() {
             for _ in 0..3 {
                 steps.advance().unwrap();
             }
-            let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-            let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+            let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
             let resumed = $method.resume(&open, &checkpoint).unwrap().run().unwrap();
             assert_eq!(resumed.last(), whole.last());
             assert_eq!(resumed.certificate(), whole.certificate());

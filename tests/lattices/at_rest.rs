@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use metriplectic::integrators::Schedule;
 use metriplectic::lattices::Model;
 use metriplectic::prelude::*;
+use metriplectic_studies::checkpoints;
 
 type Pair = (Vector2<Real>, Vector2<Real>);
 
@@ -209,10 +210,11 @@ fn a_run_from_rest_is_resumed_with_its_sizes() {
     for _ in 0..5 {
         steps.advance().unwrap();
     }
-    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
+    let checkpoint = steps.checkpoint();
+    let text = checkpoints::written(&checkpoint);
     // Sizes are in the file once for each kind of entry.
     assert!(text.contains(r#""Scale":["0.0","200.0"]"#), "{text}");
-    let read = serde_json::from_str::<Checkpoint>(&text).unwrap();
+    let read = checkpoints::reread(&checkpoint);
     let resumed = DormandPrince5.resume(&lattice, &read).unwrap().run().unwrap();
     let whole = DormandPrince5.run(&lattice, start, span).unwrap();
     assert_eq!(resumed.last().point, whole.last().point);

@@ -33,8 +33,7 @@ fn the_certificate_names_the_stiff_bond_in_every_unit() {
         for _ in 0..7 {
             steps.advance().unwrap();
         }
-        let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-        let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+        let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
         let resumed = RungeKuttaChebyshev.resume(&lattice, &checkpoint).unwrap().run().unwrap();
         assert_eq!(resumed.certificate(), whole.certificate());
     }

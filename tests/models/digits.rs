@@ -1,7 +1,8 @@
 //! The file of a checkpoint with one digit changed.
 
-use metriplectic::integrators::{Checkpoint, Element, Flow, Schedule};
+use metriplectic::integrators::{Element, Flow, Schedule};
 use metriplectic::prelude::*;
+use metriplectic_studies::checkpoints;
 
 /// Puts a run down after three steps, and changes each digit of its file to each other one: none of these files is
 /// resumed, unless it has other digits of the same numbers.
@@ -16,13 +17,13 @@ pub(crate) fn refuses_changed_digits<F: Flow, M: Method<F> + Clone>(
         steps.advance().expect("it is solved");
     }
     let checkpoint = steps.checkpoint();
-    let text = serde_json::to_string(&checkpoint).expect("it is written");
+    let text = checkpoints::written(&checkpoint);
     let (mut refused, mut same) = (0, 0);
     for at in (0..text.len()).filter(|&at| text.as_bytes()[at].is_ascii_digit()) {
         for digit in (b'0'..=b'9').filter(|&digit| digit != text.as_bytes()[at]) {
             let mut bytes = text.clone().into_bytes();
             bytes[at] = digit;
-            let read = serde_json::from_slice::<Checkpoint>(&bytes).ok();
+            let read = checkpoints::read(&bytes).ok();
             match read.filter(|read| method.clone().resume(flow, read).is_ok()) {
                 None => refused += 1,
                 Some(read) => {

@@ -1,6 +1,5 @@
 //! Single paths: energy to round-off, the same bits, units, and what the certificate says.
 
-use metriplectic::integrators::Checkpoint;
 use metriplectic::prelude::*;
 use metriplectic_studies::{Claim, Guarantee, scientific};
 use nalgebra::vector;
@@ -105,8 +104,7 @@ fn a_path_that_is_put_down_goes_on_with_the_same_bits() {
         for _ in 0..23 {
             steps.advance().unwrap();
         }
-        let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-        let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+        let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
         let resumed = method.resume(&body, &checkpoint).unwrap().run().unwrap();
         assert_eq!(resumed.last(), whole.last());
         assert_eq!(resumed.certificate(), whole.certificate());

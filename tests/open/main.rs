@@ -553,8 +553,7 @@ fn outputs_events_and_checkpoints_have_the_ledger() {
             for _ in 0..10 {
                 steps.advance().unwrap();
             }
-            let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-            let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+            let checkpoint = metriplectic_studies::checkpoints::reread(&steps.checkpoint());
             let resumed = $method.resume(&system, &checkpoint).unwrap().run().unwrap();
             assert_eq!(resumed.last(), whole.last());
             assert_eq!(resumed.certificate(), whole.certificate());

@@ -14,6 +14,7 @@ use metriplectic::integrators::{
     Checkpoint, Element, Event, Flow, ResumeError, RunError, Schedule, StageFlow, StateSpace, Steps,
 };
 use metriplectic::prelude::*;
+use metriplectic_studies::checkpoints::reread;
 
 /// The relative tolerance of the runs with steps that follow the motion.
 const TOLERANCE: f64 = 1e-5;
@@ -191,12 +192,6 @@ impl Course {
     }
 }
 
-/// A checkpoint that went through a file.
-fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
-    let text = serde_json::to_string(checkpoint).expect("it is written");
-    serde_json::from_str(&text).expect("it is read")
-}
-
 /// A flow with a start and a time in which it moves.
 #[derive(Debug)]
 pub(crate) struct Case<'a, F: Flow> {
@@ -281,7 +276,7 @@ where
         broken.expect(whole.outputs == yielded, || "the iterator yields other states".to_owned());
         for put_down in [0, 1, 2] {
             let resumed = Course::of(steps()?, put_down, |checkpoint| {
-                let resumed = method().resume(flow, &through_a_file(checkpoint));
+                let resumed = method().resume(flow, &reread(checkpoint));
                 let resumed = resumed.expect("it is the same system");
                 Some(resumed.watching(schedule.clone()).expect("it is the same schedule"))
             });

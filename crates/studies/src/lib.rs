@@ -12,6 +12,7 @@
 //! | [`published`] | and by the scheme as published? | [`Compared`], [`problems::SecondLaws`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`claim`] | which test holds a guarantee, by which figure? | [`Claim`], and the report of all |
+//! | [`checkpoints`] | is a run that was put down the same run? | [`checkpoints::reread`]: a checkpoint through its file |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines and [`Map`]s, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
 //! | [`example`] | what surrounds the model of an example? | [`Example`]: options, progress and the run; [`Record`]: its states |
@@ -46,6 +47,7 @@
 //! # Ok::<(), metriplectic_studies::OrderError>(())
 //! ```
 
+pub mod checkpoints;
 pub mod claim;
 pub mod convergence;
 pub mod drift;

@@ -29,16 +29,22 @@ fn floor(e: f64, span: impl Into<Schedule>) -> Schedule {
         .into()
 }
 
-macro_rules! ball {
-    () => {
+/// A family on a line by its energy. A pointer to a function, so that methods and tangents are compiled once for all of them.
+macro_rules! on_a_line {
+    ($parameter:literal, $energy:expr) => {{
+        let energy: fn(&Vector2<Real>, &Vector1<Real>) -> Real = $energy;
         Family::on(Euclidean::<2>)
-            .parameters(["restitution"])
+            .parameters([$parameter])
             .bracket(Symplectic)
-            .energy(|x: &Vector2<Real>, _: &Vector1<Real>| {
-                x.y * x.y * 0.5 + x.x + (x.x * 2.0).cos() * 0.1
-            })
+            .energy(energy)
             .build()
             .unwrap()
+    }};
+}
+
+macro_rules! ball {
+    () => {
+        on_a_line!("restitution", |x, _| x.y * x.y * 0.5 + x.x + (x.x * 2.0).cos() * 0.1)
     };
 }
 
@@ -138,12 +144,7 @@ fn grazing_and_other_jumps_are_refused() {
 #[test]
 fn another_jump_is_refused_beside_a_large_entry() {
     const WALL: f64 = 1e11;
-    let particle = Family::on(Euclidean::<2>)
-        .parameters(["restitution"])
-        .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * 0.5)
-        .build()
-        .unwrap();
+    let particle = on_a_line!("restitution", |x, _| x.y * x.y * 0.5);
     let system = particle.at_parameters(vector![RESTITUTION]);
     let bounced = |other: f64| {
         let span = Span::until(3.0)
@@ -279,12 +280,7 @@ fn adjoints_across_jumps_on_curved_spaces_and_in_stiff_systems() {
 fn a_bounce_has_the_derivatives_of_its_closed_form() {
     const MASS: f64 = 1e-26;
     const G: f64 = 9.81;
-    let atom = Family::on(Euclidean::<2>)
-        .parameters(["restitution"])
-        .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * (0.5 / MASS) + x.x * (MASS * G))
-        .build()
-        .unwrap();
+    let atom = on_a_line!("restitution", |x, _| x.y * x.y * (0.5 / MASS) + x.x * (MASS * G));
     let (q, e) = (1e-6, 0.7);
     let v = f64::sqrt(2.0 * G * q);
     let (t, end) = (v / G, 1.5 * v / G);
@@ -410,12 +406,7 @@ fn restitutions_and_thresholds_are_fitted() {
     assert!((fit.parameters[0] - RESTITUTION).abs() < 4.0 * error && error < 1e-3, "{fit}");
 
     // A heater that is switched at a threshold θ: x' = y, and y jumps from 1 to −1/2.
-    let heated = Family::on(Euclidean::<2>)
-        .parameters(["threshold"])
-        .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * 0.5)
-        .build()
-        .unwrap();
+    let heated = on_a_line!("threshold", |x, _| x.y * x.y * 0.5);
     let schedule = |t: &Vector1<f64>| -> Schedule {
         let threshold = t.x;
         Span::steps(0.25, 8)

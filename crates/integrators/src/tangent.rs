@@ -23,6 +23,9 @@
 //! | these of a [model](metriplectic_equations::Model) in plain numbers on a vector space | the same, with the derivatives of the model |
 //! | of any other kind of system: open, noisy, a lattice, at [values of parameters](Systems) | differences of steps beside the step, to some ten digits |
 //!
+//! [Corners](crate::Watch::corners) of a law in time stay where they are, and the tangent crosses them: the work at the frozen state has a
+//! derivative of its own. In steps beside a corner the column of the clock of an open system is that of the motion, to the error of a step.
+//!
 //! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!
 //! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
@@ -51,6 +54,7 @@ mod of_open;
 mod parameters;
 mod part;
 mod pieces;
+mod product;
 mod record;
 mod refined;
 mod saltation;

@@ -100,9 +100,38 @@ impl Corners {
         Some(corner.max(time) + apart)
     }
 
+    /// Times before and behind the corners that are this time.
+    pub(crate) fn around(&self, time: f64) -> Option<[f64; 2]> {
+        self.behind(time).map(|behind| [time - 2.0 * self.apart(time), behind])
+    }
+
     /// The time at which a step ends that goes on to a corner.
     fn before(&self, corner: f64) -> f64 {
         corner - self.apart(corner)
+    }
+
+    /// Returns whether a corner lies in a step between two times, or no farther from it than it is long.
+    pub(crate) fn is_near(&self, [time, end]: [f64; 2]) -> bool {
+        let far = (end - time).abs() + self.apart(time).max(self.apart(end));
+        self.beyond(time - far).is_some_and(|corner| corner <= end + far)
+    }
+
+    /// The intervals of a step of one size from a time on.
+    pub(crate) fn intervals(&self, time: f64, step: Fixed) -> Vec<Interval> {
+        let mut intervals = vec![self.interval(time, step, true)];
+        while let Some(last) = intervals.last().filter(|last| last.recorded < step.end) {
+            intervals.push(self.interval(last.recorded, step, false));
+        }
+        intervals
+    }
+
+    /// The interval of a step of one size that begins at a time.
+    fn interval(&self, time: f64, Fixed { h, end }: Fixed, is_first: bool) -> Interval {
+        let Stop { stop, recorded, is_corner } = self.stop(time, end);
+        let behind = self.behind(time);
+        let is_whole = is_first && behind.is_none() && !is_corner;
+        let h = if is_whole { h } else { stop - behind.unwrap_or(time) };
+        Interval { behind, h, recorded, is_corner }
     }
 
     /// How far a step may go from a time on the way to an end.
@@ -143,28 +172,35 @@ pub(crate) struct Fixed {
     pub(crate) end: f64,
 }
 
+/// A step or a part of one, without a corner inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval {
+    /// The time to which the clock is set before it, if it begins at a corner.
+    pub(crate) behind: Option<f64>,
+    /// Its size.
+    pub(crate) h: f64,
+    /// The time that is recorded at its end.
+    pub(crate) recorded: f64,
+    /// Whether it ends before a corner.
+    pub(crate) is_corner: bool,
+}
+
 /// A step of one size in a run with these corners, in parts between them.
 pub(super) fn step<F: Flow + ?Sized>(
     method: &mut dyn AnyStepper<F>,
     start: &StepStart<'_, F>,
-    Fixed { h, end }: Fixed,
+    size: Fixed,
     corners: &Corners,
 ) -> Result<Taken<F>, StepError> {
     if corners.is_empty() {
-        return method.step(start, h);
+        return method.step(start, size.h);
     }
     let flow = start.flow;
     let (mut time, mut reference) = (start.time, start.reference.clone());
     let (mut x, mut values) = (start.x.clone(), start.values.clone());
     let mut before: Option<Taken<F>> = None;
     loop {
-        let Stop { stop, recorded, is_corner } = corners.stop(time, end);
-        let behind = corners.behind(time);
-        let size = if before.is_none() && behind.is_none() && !is_corner {
-            h
-        } else {
-            stop - behind.unwrap_or(time)
-        };
+        let Interval { behind, h, recorded, .. } = corners.interval(time, size, before.is_none());
         if let Some(behind) = behind {
             method.restart();
             if let Some(clocked) = flow.clocked(&x, behind) {
@@ -180,8 +216,8 @@ pub(super) fn step<F: Flow + ?Sized>(
             reference: reference.clone(),
             allowed: start.allowed.clone(),
         };
-        let mut taken = method.step(&from, size)?;
-        taken.evidence.shortest_part = size;
+        let mut taken = method.step(&from, h)?;
+        taken.evidence.shortest_part = h;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {
             taken.values = flow.laws(&clocked);
@@ -195,7 +231,7 @@ pub(super) fn step<F: Flow + ?Sized>(
             taken.effort += before.effort;
             taken.effort.splits += 1;
         }
-        if recorded >= end {
+        if recorded >= size.end {
             return Ok(taken);
         }
         (x, values, time) = (taken.x.clone(), taken.values.clone(), recorded);

@@ -15,7 +15,7 @@ use super::linearised::{Linearised, Propagated};
 use super::part::{Part, Wide};
 use super::smooth::{FlowOf, SmoothFlow, matrix, numbers};
 use crate::noise::{Fluctuating, Noisy};
-use crate::step::{Compiled, Dim, Element, Flow as _, HasFlow, Stepper, Vector as _};
+use crate::step::{Compiled, Dim, Element, Flow, HasFlow, Stepper, Vector as _};
 
 /// A system whose runs by the method `M` have derivatives along their start and along parameters.
 ///
@@ -95,6 +95,22 @@ pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow<Flow: Smo
         costate: &DVector<f64>,
     ) -> Result<DVector<f64>, Unlinearised> {
         beside::pull_back((self.as_flow(), method, &NoParameters), step, costate)
+    }
+
+    /// Refuses a corner, at which the clock of a state is set, if its time depends on a parameter: a velocity beside the system has the law
+    /// of the other side. The sizes are those of the entries in the run, and steps have the size `h` there.
+    ///
+    /// # Errors
+    ///
+    /// [`Unlinearised::MovingCorner`].
+    fn check_corner(
+        &self,
+        sides: [&Element<FlowOf<Self>>; 2],
+        sizes: Option<&<FlowOf<Self> as Flow>::Vector>,
+        h: f64,
+    ) -> Result<(), Unlinearised> {
+        let _ = (sides, sizes, h);
+        Ok(())
     }
 
     /// Computes the error of the second law of tangents in a step, for a column at its start and at its end; `None` if it is not known.

@@ -57,7 +57,7 @@ pub trait Tangents: Sized {
     ///
     /// # Errors
     ///
-    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has corners or jumps without
+    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has jumps without
     /// [derivatives](crate::Jumping::differentiable).
     fn tangent_steps<D>(
         self,

@@ -10,8 +10,10 @@ use super::beside::{self, Parameters};
 use super::columns::{Carried, LawRows, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
+use super::explicit::NEAR;
 use super::part::Part;
 use super::smooth::SmoothFlow;
+use crate::round_off::bound::SUMMED;
 use crate::step::{Element, Flow, HasFlow, Stepper, Vector as _};
 
 /// Systems of any kind with named parameters: with ports, baths and noise, lattices, systems of your own.
@@ -230,6 +232,50 @@ impl<S: SmoothFlow, M: Stepper<S>> Differentiated<M> for SystemAt<'_, S> {
     ) -> Result<DVector<f64>, Unlinearised> {
         self.sized()?;
         beside::pull_back((&self.system, method, self), step, costate)
+    }
+
+    fn check_corner(
+        &self,
+        sides: [&Element<S>; 2],
+        sizes: Option<&S::Vector>,
+        h: f64,
+    ) -> Result<(), Unlinearised> {
+        let zero = self.system.sizes(sides[0]).zero();
+        let numbers = |flow: &S, x: &Element<S>| {
+            let mut numbers = vec![flow.laws(x).energy];
+            numbers.extend(flow.rates(x, &zero).map_or_else(Vec::new, |rates| rates.to_list()));
+            numbers
+        };
+        let [before, behind] = sides.map(|x| numbers(&self.system, x));
+        let jumps: Vec<f64> = before.iter().zip(&behind).map(|(a, b)| (b - a).abs()).collect();
+        // A jump within the round-off of the energy, or one that moves an entry by none of its size, has no derivative to lose.
+        let is_sized = |i: usize| match i.checked_sub(1) {
+            None => jumps[i] > SUMMED * self.system.term_sizes(sides[0]).energy,
+            Some(k) => {
+                let size = sizes.filter(|sizes| k < sizes.len()).map(|sizes| sizes.get(k));
+                let moves = size.is_none_or(|size| jumps[i] * h.abs() > NEAR * size);
+                moves && jumps[i] > NEAR * before[i].abs().max(behind[i].abs())
+            }
+        };
+        for (k, name) in self.names.iter().enumerate() {
+            let at = |x: &Element<S>, e: f64| {
+                let mut by = vec![0.0; self.values.len()];
+                by[k] = e;
+                Ok::<_, Unlinearised>(numbers(&self.displaced(&by)?, x))
+            };
+            let e = beside::displacement(self.values[k]);
+            for x in sides {
+                let [a, b, c, d] = [at(x, e)?, at(x, -e)?, at(x, 2.0 * e)?, at(x, -2.0 * e)?];
+                // The difference of a smooth function doubles, and that of one that jumps stays.
+                let is_off = |i: usize| {
+                    2.0 * ((c[i] - d[i]) - 2.0 * (a[i] - b[i])).abs() > jumps[i] && is_sized(i)
+                };
+                if (0..jumps.len()).any(is_off) {
+                    return Err(Unlinearised::MovingCorner { name });
+                }
+            }
+        }
+        Ok(())
     }
 
     fn moved_along(&self, x: &Element<S>, v: &DVector<f64>) -> Self::MovingWide {

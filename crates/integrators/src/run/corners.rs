@@ -100,9 +100,15 @@ impl Corners {
         Some(corner.max(time) + apart)
     }
 
-    /// Times before and behind the corners that are this time.
+    /// Times before and behind the corners that are this time, to the accuracy of the time of an event.
     pub(crate) fn around(&self, time: f64) -> Option<[f64; 2]> {
-        self.behind(time).map(|behind| [time - 2.0 * self.apart(time), behind])
+        let (apart, near) = (self.apart(time), 8.0 * self.apart(time));
+        let corner = self.beyond(time - near).filter(|corner| *corner <= time + near)?;
+        let mut last = corner;
+        while let Some(next) = self.beyond(last).filter(|next| *next <= time + near) {
+            last = next;
+        }
+        Some([corner - apart, last + apart])
     }
 
     /// The time at which a step ends that goes on to a corner.
@@ -258,6 +264,25 @@ mod tests {
         assert_eq!(found, [0.25, 0.3, 0.5, 0.75, 1.0]);
         let none = Corners::default();
         assert!(none.behind(0.5).is_none() && none.after(0.0).is_none());
+    }
+
+    #[test]
+    fn a_step_is_cut_in_intervals() {
+        let corners = Corners { times: vec![0.3, 0.35], interval: None, start: 0.0 };
+        let intervals = corners.intervals(0.25, Fixed { h: 0.25, end: 0.5 });
+        let recorded: Vec<f64> = intervals.iter().map(|interval| interval.recorded).collect();
+        assert_eq!(recorded, [0.3, 0.35, 0.5]);
+        let ends: Vec<_> = intervals.iter().map(|i| (i.behind.is_some(), i.is_corner)).collect();
+        assert_eq!(ends, [(false, true), (true, true), (true, false)]);
+        // Two times four roundings are left out at each corner.
+        let left = 0.25 - intervals.iter().map(|interval| interval.h).sum::<f64>();
+        assert!((0.0..2e-14).contains(&left), "{left:e}");
+        let whole = corners.intervals(0.5, Fixed { h: 0.25, end: 0.75 });
+        assert!(whole.len() == 1 && whole[0].h.to_bits() == 0.25_f64.to_bits());
+        assert!(corners.is_near([0.25, 0.28]) && corners.is_near([0.4, 0.5]));
+        assert!(!corners.is_near([0.5, 0.6]) && !corners.is_near([0.1, 0.15]));
+        let [before, behind] = corners.around(0.3 + 1e-15).expect("a corner");
+        assert!(before < 0.3 && behind > 0.3 && corners.around(0.3 + 1e-13).is_none());
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub enum Unlinearised {
     /// The time of a corner depends on a parameter.
     #[error(
         "the law changes at a time that depends on the parameter {name}, and the corner that is named stays where it is; take differences \
-         of runs over schedules that name the corner of each, as `run_each` of `Fit::of_systems` does"
+         of whole runs, each of which names its own corner"
     )]
     MovingCorner {
         /// The parameter.

@@ -21,7 +21,8 @@ pub struct TangentEvent<F: Flow> {
     pub state: TangentState<F>,
     /// The velocity of the state along the size of the last step. It is that of the discrete map.
     pub velocity: DVector<f64>,
-    /// The largest size that each entry has had in the run, or soon has from its start; zero for one that stays zero.
+    /// The largest size that each entry has had in the run, or soon has from its start; zero for one that stays zero, for the clock and for
+    /// the ledger.
     pub sizes: DVector<f64>,
     /// The velocity behind a corner at this time, less that before it.
     pub(super) across: Option<DVector<f64>>,
@@ -115,8 +116,12 @@ impl<F: Flow> Located<'_, F> {
         late: impl Fn(usize) -> f64,
     ) -> Result<(), TangentError<F::Space>> {
         let leaves = |k: usize| (along[k] + late(k)).abs() > SUMMED * along[k].abs();
-        let changes =
-            |across: &&DVector<f64>| self.speed(across) > NEAR * self.speed(self.velocity);
+        let v = self.velocity;
+        let changes = |across: &&DVector<f64>| {
+            let mut unsized_rates = (0..v.len()).filter(|&i| self.sizes[i] == 0.0);
+            self.speed(across) > NEAR * self.speed(v)
+                || unsized_rates.any(|i| across[i].abs() > NEAR * v[i].abs())
+        };
         if self.across.filter(changes).is_some() && (0..along.len()).any(leaves) {
             let (event, time) = (self.event.name.to_string(), self.event.state.time);
             return Err(TangentError::EventAtCorner { event, time });

@@ -222,6 +222,7 @@ impl<'a, D: Differentiated<M>, M: Stepper<FlowOf<D>>> Taker<'a, D, M> {
             if taken.evidence.dissipates {
                 self.reference.entropy = taken.values.entropy;
             }
+            self.values = taken.values;
             (parts, taken.x)
         };
         if let (Some(end), Some(last)) = (end, parts.last_mut()) {

@@ -54,14 +54,16 @@ pub(super) fn again<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     Some(Again { memory: steps.saved_memory(), sizes, whole: f64::NAN, is_still: false })
 }
 
-/// The sizes of the entries at an event: the largest ones of the run, and those there.
+/// The sizes of the entries at an event: the largest ones of the run, and those there. Its function does not depend on a ledger, whose
+/// entries may be small and fast.
 pub(super) fn sizes_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     (system, _): (&D, &M),
     scales: &Scales<VectorOf<D>>,
     x: &Element<FlowOf<D>>,
 ) -> DVector<f64> {
     let (ends, reached) = (&scales.sizes, system.units(x));
-    DVector::from_fn(system.as_flow().directions(), |i, _| ends.get(i).max(reached[i]))
+    let size = |i: usize| if i < ends.len() { ends.get(i).max(reached[i]) } else { 0.0 };
+    DVector::from_fn(system.as_flow().directions(), |i, _| size(i))
 }
 
 /// The sizes of all directions after a step of size `h`, which is that of a clock.

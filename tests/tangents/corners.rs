@@ -575,8 +575,8 @@ fn tangents_of_every_kind_of_system_cross_corners() {
     let start = vector![0.4, -1.0, 0.3];
     macro_rules! closed {
         ($($method:expr),+) => {$(
-            for span in [Schedule::from(Span::steps(0.25, 8)), Span::until(2.0).tolerance(1e-6).into()] {
-                let schedule = span.corners([0.3, 0.35, 1.0]).output_at([0.3, 0.4, 2.0]);
+            for span in [Schedule::from(Span::steps(0.05, 40)), Span::until(2.0).tolerance(1e-6).into()] {
+                let schedule = span.corners([0.32, 0.34, 1.0]).output_at([0.32, 0.4, 2.0]);
                 let run = $method.tangent(&system, start, schedule.clone()).expect("a tangent");
                 let plain = $method.run(&system, start, schedule.clone()).expect("it runs");
                 assert!(plain.last().point == run.last().point);
@@ -593,7 +593,7 @@ fn tangents_of_every_kind_of_system_cross_corners() {
                 let fine = $method.tangent(&system, start, Span::steps(0.002, 1000)).unwrap();
                 let error = off(&run.last().matrix(), &fine.last().matrix());
                 println!("{}: transposed {transposed:.1e}, {error:.1e}, {}", stringify!($method), run.sensitivity());
-                assert!(transposed < 1e-13 && run.sensitivity().energy < 1e-12 && error < 2e-2);
+                assert!(transposed < 1e-13 && run.sensitivity().energy < 1e-12 && error < 5e-2);
             }
         )+};
     }

@@ -104,15 +104,15 @@ fn by_parts(model: &dyn Model, x: &[f64], laws: &[LawAt]) -> Option<Motion> {
         let LawAt { df, hf, .. } = &laws[law];
         let (value, mut slope) = (Directions::of(df.as_slice()), Matrix::zeros(n));
         slope.numbers_mut().copy_from_slice(hf.as_slice());
-        WithJacobian { value, slope }
+        WithJacobian::new(value, slope)
     });
     let jet = written_velocity_jet(parts, &x.into(), &w)?;
     let mut rise = DVector::zeros(n);
-    if let Some(WithJacobian { value, slope }) = &jet.irreversible {
+    if let Some(WithJacobian { value, slope, .. }) = &jet.irreversible {
         let LawAt { df: ds, hf: hs, .. } = &laws[ENTROPY];
         rise = of(slope).tr_mul(ds) + hs * DVector::from_column_slice(value.numbers());
     }
-    let WithJacobian { value, slope } = &jet.velocity;
+    let WithJacobian { value, slope, .. } = &jet.velocity;
     let velocity = DVector::from_column_slice(value.numbers());
     Some(Motion { velocity, slope: of(slope), production: jet.production, rise })
 }

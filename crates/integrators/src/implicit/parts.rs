@@ -62,12 +62,39 @@ impl<V> OfLaws<Option<V>> {
 pub(crate) struct WithJacobian<L: Lengths> {
     pub(crate) value: L::Vector,
     pub(crate) slope: Matrix<L>,
+    /// The summands of the derivatives, if they are known apart.
+    pub(super) apart: Option<Box<Apart<L>>>,
+}
+
+/// A matrix `B + a bᵀ` by its summands, of which `B` may have few entries.
+#[derive(Debug)]
+pub(super) struct Apart<L: Lengths> {
+    pub(super) base: Matrix<L>,
+    pub(super) column: L::Vector,
+    pub(super) row: L::Vector,
+}
+
+impl<L: Lengths> WithJacobian<L> {
+    #[inline]
+    pub(crate) const fn new(value: L::Vector, slope: Matrix<L>) -> Self {
+        Self { value, slope, apart: None }
+    }
+
+    /// The derivatives `A ∂w` of a function with the derivatives `A`.
+    #[inline]
+    pub(super) fn before(&self, a: &Matrix<L>) -> Matrix<L> {
+        let Some(apart) = &self.apart else { return a.product(&self.slope) };
+        let Apart { base, column, row } = &**apart;
+        let mut product = a.product(base);
+        product.add_outer(1.0, &a.times(column), row);
+        product
+    }
 }
 
 impl<L: Lengths> Clone for WithJacobian<L> {
     #[inline]
     fn clone(&self) -> Self {
-        Self { value: self.value.clone(), slope: self.slope.clone() }
+        Self::new(self.value.clone(), self.slope.clone())
     }
 }
 

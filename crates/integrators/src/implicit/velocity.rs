@@ -5,7 +5,7 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::velocity::{CASIMIR, MOMENTUM};
 use metriplectic_equations::Part;
 
-use super::algebra::{Matrix, add, dot};
+use super::algebra::{FEW, Matrix, add, dot, vector};
 use super::metric::{MetricAlong, Units};
 use super::orthogonal::{Of, Orthogonal, OrthogonalJet, scaled};
 use super::parts::{OfLaws, PartJet, Parts, WithJacobian};
@@ -151,6 +151,8 @@ struct OfPart<L: Lengths> {
     vector: WithJacobian<L>,
     /// Its derivative along the covector that it acts on.
     tensor: Matrix<L>,
+    /// Its derivative along the other covector that it depends on.
+    along_w: Matrix<L>,
     /// The absolute terms that it is summed of.
     terms: L::Vector,
 }
@@ -158,6 +160,9 @@ struct OfPart<L: Lengths> {
 /// `|A| |v|`.
 fn terms<L: Lengths>(a: &Matrix<L>, v: &L::Vector) -> L::Vector {
     let n = v.numbers().len();
+    if n > FEW {
+        return a.abs_times(&vector(n, |j| v[j].abs()));
+    }
     let mut sum = L::Vector::room(|| n);
     for i in 0..n {
         sum[i] = (0..n).fold(0.0, |sum, j| sum + a[(i, j)].abs() * v[j].abs());
@@ -185,7 +190,7 @@ impl<L: Lengths> Copy for Turn<'_, L> {}
 impl<L: Lengths> Turn<'_, L> {
     /// The derivatives `A ∂z` of a function with the derivatives `A`.
     #[inline]
-    pub(super) fn after(self, a: &Matrix<L>) -> Matrix<L> {
+    pub(super) fn after(self, a: Matrix<L>) -> Matrix<L> {
         match self {
             Self::Scaled(c) => scaled(a, c),
             Self::By(dz) => a.product(dz),
@@ -213,30 +218,29 @@ impl<L: Lengths> Linearisation<'_, L> {
         part: Part,
         alpha: &WithJacobian<L>,
         other: &WithJacobian<L>,
-    ) -> Option<(PartJet<L>, OfPart<L>)> {
+    ) -> Option<OfPart<L>> {
         let OfLaws { energy, entropy, .. } = self.w;
         let w = [&energy.value, &entropy.value, &alpha.value];
-        let jet = self.parts.linearise(part, self.z, w)?;
-        let mut slope = self.dz.after(&jet.along_x);
-        slope.add(1.0, &jet.along_w.product(&other.slope));
-        slope.add(1.0, &jet.tensor.product(&alpha.slope));
+        let PartJet { value, along_x, along_w, tensor } = self.parts.linearise(part, self.z, w)?;
+        let mut slope = self.dz.after(along_x);
+        slope.add(1.0, &other.before(&along_w));
+        slope.add(1.0, &alpha.before(&tensor));
         if self.is_whole
             && part == Part::Irreversible
             && let Some(along_entropy) = self.parts.friction_along_entropy(self.z, w)?
         {
             slope.add(1.0, &along_entropy.product(&entropy.slope));
         }
-        let terms = terms(&jet.tensor, &alpha.value);
-        let vector = WithJacobian { value: jet.value.clone(), slope };
-        let tensor = jet.tensor.clone();
-        Some((jet, OfPart { vector, tensor, terms }))
+        let terms = terms(&tensor, &alpha.value);
+        let vector = WithJacobian::new(value, slope);
+        Some(OfPart { vector, tensor, along_w, terms })
     }
 
     /// A part that is zero.
     fn none(&self) -> OfPart<L> {
         let zeros = || self.parts.zeros();
-        let vector = WithJacobian { value: self.parts.zero(), slope: zeros() };
-        OfPart { vector, tensor: zeros(), terms: self.parts.zero() }
+        let vector = WithJacobian::new(self.parts.zero(), zeros());
+        OfPart { vector, tensor: zeros(), along_w: zeros(), terms: self.parts.zero() }
     }
 
     /// `Π w_H` without a projection, as it is written by hand.
@@ -245,7 +249,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         if !parts.moves {
             return Some(self.none());
         }
-        Some(self.part(Part::Reversible, &w.energy, &w.entropy)?.1)
+        self.part(Part::Reversible, &w.energy, &w.entropy)
     }
 
     fn reversible(&self) -> Option<OfPart<L>> {
@@ -253,8 +257,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         if !parts.moves {
             return Some(self.none());
         }
-        let bracket =
-            |alpha: &WithJacobian<L>| Some(self.part(Part::Reversible, alpha, &w.entropy)?.1);
+        let bracket = |alpha: &WithJacobian<L>| self.part(Part::Reversible, alpha, &w.entropy);
         let (is_projected, has_momenta) = (parts.is_projected(), parts.has(Kind::Momentum));
         if !is_projected && !has_momenta {
             return bracket(&w.energy);
@@ -265,7 +268,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         }
         parts.of_kind(Kind::Casimir, w).for_each(|c| normals.push_in(metric, c));
         let mut pi = if is_projected {
-            bracket(&normals.faded(0, (&w.energy, Of::Covector), CASIMIR))?
+            bracket(&normals.faded(0, (w.energy.clone(), Of::Covector), CASIMIR))?
         } else {
             bracket(&w.energy)?
         };
@@ -278,7 +281,7 @@ impl<L: Lengths> Linearisation<'_, L> {
             add(&mut pi.terms, 1.0, &terms(&pi.tensor, &of_covector));
             let v = (&pi.vector.value, Of::Vector);
             normals.add_terms(0, v, CASIMIR, (&mut pi.terms, 1.0));
-            pi.vector = normals.faded(0, (&pi.vector, Of::Vector), CASIMIR);
+            pi.vector = normals.faded(0, (pi.vector, Of::Vector), CASIMIR);
         }
         if has_momenta {
             normals.push_in(metric, &w.energy);
@@ -287,14 +290,14 @@ impl<L: Lengths> Linearisation<'_, L> {
             let amplification = 1.0 + normals.amplification(first, MOMENTUM);
             let v = (&pi.vector.value, Of::Vector);
             normals.add_terms(first, v, MOMENTUM, (&mut pi.terms, amplification));
-            pi.vector = normals.faded(first, (&pi.vector, Of::Vector), MOMENTUM);
+            pi.vector = normals.faded(first, (pi.vector, Of::Vector), MOMENTUM);
         }
         Some(pi)
     }
 
     fn force(&self) -> Option<OfPart<L>> {
         let &Self { parts, w, metric, .. } = self;
-        let (_, mut force) = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
+        let mut force = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
         if parts.kinds.is_empty() {
             return Some(force);
         }
@@ -370,19 +373,20 @@ impl<L: Lengths> Linearisation<'_, L> {
             normals.push_in(metric, &w.energy);
             first = normals.len();
             w.invariants.iter().for_each(|l| normals.push_in(metric, l));
-            alpha = Some(normals.covector(first, &w.entropy));
+            alpha = Some(normals.covector(first, w.entropy.clone()));
         }
         let alpha = alpha.as_ref().unwrap_or(&w.entropy);
-        let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
+        let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
+        let (mut sum, mut terms, mut sensitivity) = (pi.vector, pi.terms, pi.tensor);
         let mut irreversible = None;
         if parts.rubs {
-            let (jet, k) = self.part(Part::Irreversible, alpha, &w.energy)?;
+            let k = self.part(Part::Irreversible, alpha, &w.energy)?;
             let amplified = 1.0 + normals.amplification(first, MOMENTUM);
             add(&mut terms, 1.0, &k.terms);
             let v = (&k.vector.value, Of::Vector);
             normals.add_terms(first, v, MOMENTUM, (&mut terms, amplified));
-            sensitivity.add(1.0, &jet.along_w);
-            irreversible = Some(normals.vector(first, &k.vector));
+            sensitivity.add(1.0, &k.along_w);
+            irreversible = Some(normals.vector(first, k.vector));
         }
         if parts.is_forced {
             let force = self.force()?;
@@ -397,7 +401,6 @@ impl<L: Lengths> Linearisation<'_, L> {
                 None => force.vector,
             });
         }
-        let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
         let (mut production, mut friction) = (0.0, 0.0);
         if let Some(irreversible) = &irreversible {
             production = dot(&w.entropy.value, &irreversible.value);

@@ -2,7 +2,7 @@
 
 use metriplectic_equations::{ENERGY, ENTROPY};
 
-use super::gradient::{LawAlong, Line, MovingLine, Stable};
+use super::gradient::{LawAlong, Line, MovingLine, Slope, Stable};
 use crate::implicit::algebra::{Matrix, add, dot, is_finite};
 use crate::implicit::drift;
 use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
@@ -156,28 +156,29 @@ impl<'a, L: Lengths> Equation<'a, L> {
     fn jets(
         &self,
         line: &Line<'_, L>,
-        mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Matrix<L>,
+        mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Slope<L>,
     ) -> Option<OfLaws<WithJacobian<L>>> {
         let parts = self.parts;
         let w = parts.each_law(|law| {
             if !self.is_discrete(law) {
                 let second = parts.second(law, &line.z);
-                let slope = line.dz().after(&second.hf);
-                return Some(WithJacobian { value: second.df, slope });
+                let slope = line.dz().after(second.hf);
+                return Some(WithJacobian::new(second.df, slope));
             }
             let [start, drift] = self.start_of(law);
             let (end, df) = parts.jet(law, &line.end);
             let along = LawAlong { parts, law, line };
             let stable = along.stable(self.line.gradient, [start, end], true)?;
             let value = stable.covector(drift, line);
-            Some(WithJacobian { value, slope: slope(law, stable, &df) })
+            let Slope { matrix: slope, apart } = slope(law, stable, &df);
+            Some(WithJacobian { value, slope, apart })
         });
         w.all()
     }
 
     /// The Jacobian `∂d − h ∂V` of the residual, from the derivatives of the velocity.
     #[inline]
-    fn jacobian(&self, line: &Line<'_, L>, velocity: &Matrix<L>) -> Matrix<L> {
+    fn jacobian(&self, line: &Line<'_, L>, velocity: Matrix<L>) -> Matrix<L> {
         let mut jacobian = velocity.map(|slope| -(slope * self.h));
         if let Some([_, dd, _]) = line.slopes() {
             jacobian.add(1.0, dd);
@@ -203,7 +204,7 @@ impl<'a, L: Lengths> Equation<'a, L> {
             stable.slope_above_round_off(along, df)
         })?;
         let jet = whole_velocity_jet(parts, &line.z, self.line.path.base(), &w)?;
-        let jacobian = self.jacobian(line, &jet.velocity.slope);
+        let jacobian = self.jacobian(line, jet.velocity.slope);
         let mut growth = parts.zero();
         if let Some(friction) = &jet.irreversible {
             add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
@@ -246,7 +247,7 @@ impl<'a, L: Lengths> Equation<'a, L> {
             Stiffness { friction: 2.0 * h.abs() * friction, rotation: 2.0 * h.abs() * rotation };
         let evidence = self.dissipated(&w.entropy.value, production);
         let residual = parts.vector(|i| d[i] - velocity.value[i] * h);
-        let jacobian = self.jacobian(line, &velocity.slope);
+        let jacobian = self.jacobian(line, velocity.slope);
         let is_usable = is_finite(&residual) && jacobian.magnitude().is_finite();
         is_usable.then(|| Linearised {
             residual,

@@ -38,10 +38,10 @@ impl Heating<'_> {
             let mut normals = OrthogonalJet::none();
             for i in (0..n).filter(|i| self.still[*i]) {
                 let value = Directions::from_index(n, |j| if j == i { 1.0 } else { 0.0 });
-                normals.push(&WithJacobian { value, slope: Matrix::zeros(n) });
+                normals.push(&WithJacobian::new(value, Matrix::zeros(n)));
             }
             w.invariants.iter().for_each(|l| normals.push(l));
-            Some([normals.covector(0, &w.entropy)])
+            Some([normals.covector(0, w.entropy.clone())])
         })?;
         Ok(sharp)
     }

@@ -69,7 +69,7 @@ impl Stage {
             let w = self.w.map(|w| {
                 number += 1;
                 let own = if number == argument { 1.0 } else { 0.0 };
-                WithJacobian { value: w.numbers(), slope: Matrix::scaled_one(n, own) }
+                WithJacobian::new(w.numbers(), Matrix::scaled_one(n, own))
             });
             let at = if argument == 0 { 1.0 } else { 0.0 };
             let jets = jets(&self.place, at, &w).ok_or(Unlinearised::Singular)?;
@@ -90,7 +90,7 @@ impl Stage {
             let jet = whole_velocity_jet(parts, x, moved, w)?;
             let VelocityJet { velocity, irreversible, .. } = jet;
             let n = parts.n();
-            let none = || WithJacobian { value: Directions::zeros(n), slope: Matrix::zeros(n) };
+            let none = || WithJacobian::new(Directions::zeros(n), Matrix::zeros(n));
             Some([velocity, irreversible.unwrap_or_else(none)])
         })
     }

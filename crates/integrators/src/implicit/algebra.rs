@@ -374,3 +374,54 @@ impl<L: Lengths> Matrix<L> {
         Some(inverse)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::AtRunTime;
+    use crate::step::Directions;
+
+    /// A matrix with zeros inside of its rows and at their ends, and with one row of zeros.
+    fn matrix(n: usize, seed: f64) -> Matrix<AtRunTime> {
+        let entry = |i: usize, j: usize| (seed + 1.7 * i as f64 + 0.9 * (i * j) as f64).sin();
+        let is_zero = |i: usize, j: usize| i == 2 || (i + 2 * j) % 3 == 0 || j + 4 < i;
+        Matrix::of(n, |i, j| if is_zero(i, j) { 0.0 } else { entry(i, j) })
+    }
+
+    #[test]
+    fn products_of_many_numbers_are_those_of_their_definition() {
+        for n in [3, 8, 9, 10, 11, 12, 15] {
+            let (a, b) = (matrix(n, 0.3), matrix(n, 1.1));
+            let v = vector::<Directions>(n, |i| (0.4 + i as f64).cos());
+            let (product, times, sizes) = (a.product(&b), a.times(&v), a.abs_times(&v));
+            // Sums of up to fifteen numbers of order one.
+            let near = |x: f64, y: f64| (x - y).abs() <= 15.0 * f64::EPSILON;
+            for i in 0..n {
+                assert!(near(times[i], (0..n).map(|k| a[(i, k)] * v[k]).sum()), "{n}, {i}");
+                assert!(near(sizes[i], (0..n).map(|k| a[(i, k)].abs() * v[k]).sum()), "{n}, {i}");
+                for j in 0..n {
+                    let sum = (0..n).map(|k| a[(i, k)] * b[(k, j)]).sum();
+                    assert!(near(product[(i, j)], sum), "{n}, {i}, {j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_inverse_of_many_numbers_undoes_its_matrix_with_any_pivots() {
+        for n in [3, 9, 14] {
+            // The largest numbers stand beside the diagonal, so that rows change their places.
+            let few = matrix(n, 0.7);
+            let a: Matrix<AtRunTime> =
+                Matrix::of(n, |i, j| few[(i, j)] * 0.1 + if j == (i + 3) % n { 2.0 } else { 0.0 });
+            let one = a.inverse().expect("it is regular").product(&a);
+            for i in 0..n {
+                for j in 0..n {
+                    let wanted = if i == j { 1.0 } else { 0.0 };
+                    assert!((one[(i, j)] - wanted).abs() < 1e-14, "{n}, {i}, {j}: {one:?}");
+                }
+            }
+            assert!(matrix(n, 0.7).inverse().is_none(), "a row is zero");
+        }
+    }
+}

@@ -9,6 +9,7 @@ use smallvec::SmallVec;
 use crate::numbers::{Lengths, List};
 
 /// The number of variables up to which sums are taken in the order of types, term by term.
+/// A factor of four fails `implicit/algebra.rs::sums_of_few_numbers_have_the_bits_of_types`.
 pub(super) const FEW: usize = 8;
 
 /// The vector of `n` numbers that are given by their index.
@@ -405,6 +406,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn sums_of_few_numbers_have_the_bits_of_types() {
+        let in_order = |n: usize| {
+            let a: Matrix<AtRunTime> = Matrix::of(n, |i, j| (0.3 + (i * n + j) as f64).sin());
+            let v = vector::<Directions>(n, |i| (0.4 + i as f64).cos());
+            let of_row = |i: usize| (1..n).fold(a[(i, 0)] * v[0], |sum, k| sum + a[(i, k)] * v[k]);
+            let product = a.times(&v);
+            (0..n).all(|i| product[i].to_bits() == of_row(i).to_bits())
+        };
+        assert!(in_order(8) && !in_order(32));
     }
 
     #[test]

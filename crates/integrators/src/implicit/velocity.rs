@@ -1,6 +1,8 @@
 //! The velocity `Π̃ w_H + K̃ w_S` of a model for given covectors, as in [`metriplectic_dynamics::velocity`], whose formulas they are,
 //! with its derivatives along the unknown of a step.
 
+use std::ops::Range;
+
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::velocity::{CASIMIR, MOMENTUM};
 use metriplectic_equations::Part;
@@ -204,6 +206,8 @@ struct Linearisation<'a, L: Lengths> {
     w: &'a OfLaws<WithJacobian<L>>,
     /// Says whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
     is_whole: bool,
+    /// The parameters that the columns stand for, if they are no directions.
+    parameters: Range<usize>,
 }
 
 impl<L: Lengths> Linearisation<'_, L> {
@@ -225,6 +229,9 @@ impl<L: Lengths> Linearisation<'_, L> {
             && let Some(along_entropy) = self.parts.friction_along_entropy(self.z, w)?
         {
             slope.add(1.0, &along_entropy.product(&entropy.slope));
+        }
+        if !self.parameters.is_empty() {
+            slope.add(1.0, &self.parts.along_parameters(part, self.z, w, &self.parameters)?);
         }
         let terms = terms(&jet.tensor, &alpha.value);
         let vector = WithJacobian { value: jet.value.clone(), slope };
@@ -321,27 +328,51 @@ pub(super) fn velocity_jet<L: Lengths>(
     (z, dz, metric): (&L::State, Turn<'_, L>, Option<&MetricAlong<'_, L>>),
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz, metric, w, is_whole: false }.velocity()
+    Linearisation { parts, z, dz, metric, w, is_whole: false, parameters: 0..0 }.velocity()
 }
 
-/// Computes [`velocity_jet`] with all derivatives, on a vector space with the canonical metric, where that of the point is a multiple
-/// `dz` of the identity.
+/// The columns of whole derivatives on a vector space with the canonical metric.
+#[derive(Clone, Debug)]
+pub(crate) enum Columns {
+    /// The directions of an unknown, along which the point moves by this multiple of it.
+    Directions(f64),
+    /// These parameters, no more of them than directions. The point stays where it is.
+    Parameters(Range<usize>),
+}
+
+/// A linearisation with all derivatives, on a vector space with the canonical metric.
+fn whole<'a, L: Lengths>(
+    parts: &'a Parts<'_, L>,
+    z: &'a L::State,
+    columns: Columns,
+    w: &'a OfLaws<WithJacobian<L>>,
+) -> Linearisation<'a, L> {
+    let (dz, parameters) = match columns {
+        Columns::Directions(dz) => (dz, 0..0),
+        Columns::Parameters(parameters) => (0.0, parameters),
+    };
+    let dz = Turn::Scaled(dz);
+    Linearisation { parts, z, dz, metric: None, w, is_whole: true, parameters }
+}
+
+/// Computes [`velocity_jet`] with all derivatives, on a vector space with the canonical metric.
 pub(crate) fn whole_velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
-    dz: f64,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz: Turn::Scaled(dz), metric: None, w, is_whole: true }.velocity()
+    whole(parts, z, columns, w).velocity()
 }
 
-/// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives along the state.
+/// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives.
 pub(super) fn written_velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    let at = Linearisation { parts, z, dz: Turn::Scaled(1.0), metric: None, w, is_whole: true };
+    let at = whole(parts, z, columns, w);
     at.with_reversible(at.written()?)
 }
 
@@ -349,11 +380,10 @@ pub(super) fn written_velocity_jet<L: Lengths>(
 pub(crate) fn reversible_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
-    dz: f64,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<WithJacobian<L>> {
-    let dz = Turn::Scaled(dz);
-    Some(Linearisation { parts, z, dz, metric: None, w, is_whole: true }.reversible()?.vector)
+    Some(whole(parts, z, columns, w).reversible()?.vector)
 }
 
 impl<L: Lengths> Linearisation<'_, L> {

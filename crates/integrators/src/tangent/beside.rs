@@ -60,6 +60,15 @@ pub(super) trait Parameters<F> {
     ///
     /// [`Unlinearised::NoSystem`] if the closure of the system refuses them.
     fn displaced(&self, by: &[f64]) -> Result<F, Unlinearised>;
+
+    /// Computes the differentials of the laws in all directions, if those along the parameters are known.
+    fn known_rows(&self, x: &Element<F>) -> Option<LawRows<DVector<f64>>>
+    where
+        F: Flow,
+    {
+        let _ = x;
+        None
+    }
 }
 
 /// The parameters of a system without parameters.
@@ -273,7 +282,7 @@ impl<F: SmoothFlow, M: Stepper<F>> Beside<'_, F, M> {
     }
 }
 
-/// Computes the differentials of the laws along the state and, by differences, along the parameters.
+/// Computes the differentials of the laws along the state and along the parameters, by differences where these are not known.
 ///
 /// # Errors
 ///
@@ -283,6 +292,9 @@ pub(super) fn law_rows<F: SmoothFlow>(
     parameters: &dyn Parameters<F>,
     x: &Element<F>,
 ) -> Result<LawRows<DVector<f64>>, Unlinearised> {
+    if let Some(rows) = parameters.known_rows(x) {
+        return Ok(rows);
+    }
     let (n, values) = (flow.directions(), parameters.values());
     let rows = flow.law_rows(x);
     let mut rows = rows.map(|row| row.clone().resize_vertically(n + values.len(), 0.0));

@@ -1,6 +1,6 @@
 //! The systems whose runs by a method have derivatives.
 
-use metriplectic_dynamics::{Differentiable, Metriplectic, VectorField as _};
+use metriplectic_dynamics::{Differentiable, Metriplectic, ModelError, VectorField as _};
 use metriplectic_fields::{
     ChartPoint, Column as _, Dimension as _, Matrix, Real, Space, Square as _, Vector,
 };
@@ -23,7 +23,7 @@ use crate::step::{Compiled, Dim, Element, Flow as _, HasFlow, Stepper, Vector as
 /// of all directions.
 ///
 /// The derivatives of a step are exact for systems in types and, as far as its own derivatives are, for a
-/// [model](metriplectic_equations::Model) on a vector space. For any other kind of system they are formed by differences of steps beside
+/// [model](metriplectic_equations::Model) on a vector space, along its start and along the parameters that it knows. For any other kind of system they are formed by differences of steps beside
 /// it, as in the defaults here: with the same size, the same random numbers and the same branch of the method, to some ten digits.
 ///
 /// Laws: those of [`Linearised`].
@@ -57,6 +57,16 @@ pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow<Flow: Smo
     /// Computes the differentials of the laws at a state, in all directions.
     fn wide_rows(&self, x: &Element<FlowOf<Self>>) -> LawRows<DVector<f64>> {
         self.as_flow().law_rows(x)
+    }
+
+    /// Compares what the system knows of its derivatives along parameters with its values, at the start of a run.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] with the derivative that is not that of the values.
+    fn check_parameters(&self, x: &Element<FlowOf<Self>>) -> Result<(), ModelError> {
+        let _ = x;
+        Ok(())
     }
 
     /// Computes the size of each direction.

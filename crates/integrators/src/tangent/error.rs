@@ -44,8 +44,8 @@ pub enum Unlinearised {
     NoSize,
     /// A parameter is zero, and derivatives along it are differences.
     #[error(
-        "the parameter {name} is zero, so that a difference along it has no size; take another value, or a `Family`, whose derivatives \
-         are exact"
+        "the parameter {name} is zero, so that a difference along it has no size; take another value, or a `Family` or a model that \
+         knows its parameters, whose derivatives are exact"
     )]
     ZeroParameter {
         /// The parameter.

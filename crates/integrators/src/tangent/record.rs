@@ -72,6 +72,7 @@ pub trait Tangents: Sized {
         let schedule: Schedule = schedule.into();
         let jumps = smooth_events((system, &self), &schedule)?;
         let steps = self.steps(system.as_flow(), x0, schedule)?;
+        system.check_parameters(&steps.state().point).map_err(RunError::from)?;
         let laws = in_wide_room::<D, Self, _>(system, || system.wide_rows(&steps.state().point));
         let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());
         Ok(TangentSteps { system, steps, carried, sensitivity, jumps, largest: None })

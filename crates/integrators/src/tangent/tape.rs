@@ -261,6 +261,8 @@ impl<F: SmoothFlow> Tape<F> {
     {
         let events = smooth_events((system, &method), &schedule)?;
         let steps = method.steps(system.as_flow(), x0, schedule.clone())?;
+        let checked = Differentiated::<M>::check_parameters(system, &steps.state().point);
+        checked.map_err(RunError::<F::Space>::from)?;
         let start = Taped { state: steps.state().clone(), number: 0 };
         let mut recording = steps.recording(start).map_err(RunError::<F::Space>::from)?;
         let mut recorder = Recorder { system, steps, events, number: 0, largest: None };

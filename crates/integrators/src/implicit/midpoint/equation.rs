@@ -1,12 +1,14 @@
 //! The equation of one step of the midpoint scheme, as in [`Residual`](crate::Residual), whose formula it is.
 
+use std::ops::Range;
+
 use metriplectic_equations::{ENERGY, ENTROPY};
 
 use super::gradient::{LawAlong, Line, MovingLine, Stable};
 use crate::implicit::algebra::{Matrix, add, dot, is_finite};
 use crate::implicit::drift;
 use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
-use crate::implicit::velocity::{VelocityJet, velocity_jet, whole_velocity_jet};
+use crate::implicit::velocity::{Columns, VelocityJet, velocity_jet, whole_velocity_jet};
 use crate::newton::Stiffness;
 use crate::numbers::Lengths;
 use crate::round_off::bound::{ROUNDED, is_dissipated};
@@ -64,6 +66,29 @@ pub(crate) struct FromEnd<L: Lengths> {
     pub(crate) energy: L::Vector,
     /// The derivative of the growth `h⟨w_S, K̃ w_S⟩` of the entropy.
     pub(crate) growth: L::Vector,
+}
+
+/// The equation at its root, along parameters.
+pub(crate) struct AlongParameters<L: Lengths> {
+    /// The derivatives `h ∂V` of the motion, a column for each.
+    pub(crate) motion: Matrix<L>,
+    /// Those of the growth of the entropy.
+    pub(crate) growth: L::Vector,
+}
+
+/// The derivative of the growth `h⟨w_S, K̃ w_S⟩` of the entropy.
+fn growth<L: Lengths>(
+    parts: &Parts<'_, L>,
+    h: f64,
+    jet: &VelocityJet<L>,
+    w: &OfLaws<WithJacobian<L>>,
+) -> L::Vector {
+    let mut growth = parts.zero();
+    if let Some(friction) = &jet.irreversible {
+        add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
+        add(&mut growth, h, &friction.slope.transpose_times(&w.entropy.value));
+    }
+    growth
 }
 
 /// The round-off of a residual, as in [`Rounding`](crate::Rounding).
@@ -202,14 +227,48 @@ impl<'a, L: Lengths> Equation<'a, L> {
             }
             stable.slope_above_round_off(along, df)
         })?;
-        let jet = whole_velocity_jet(parts, &line.z, self.line.path.base(), &w)?;
+        let jet =
+            whole_velocity_jet(parts, &line.z, Columns::Directions(self.line.path.base()), &w)?;
         let jacobian = self.jacobian(line, &jet.velocity.slope);
-        let mut growth = parts.zero();
-        if let Some(friction) = &jet.irreversible {
-            add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
-            add(&mut growth, h, &friction.slope.transpose_times(&w.entropy.value));
-        }
+        let growth = growth(parts, h, &jet, &w);
         jacobian.magnitude().is_finite().then_some(FromEnd { jacobian, energy, growth })
+    }
+
+    /// The derivatives along parameters at the root `u`, with both ends where they are, on a vector space; `None` where it is not defined.
+    pub(super) fn along_parameters(
+        &self,
+        u: &L::Vector,
+        parameters: Range<usize>,
+    ) -> Option<AlongParameters<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.path, u, false)?;
+        let kind = self.line.gradient;
+        let along: Vec<_> = parameters.clone().map(|k| parts.along_parameter(k)).collect();
+        let w = parts.each_law(|law| {
+            let of_law = LawAlong { parts, law, line };
+            let value = if self.is_discrete(law) {
+                let ends = [self.start_of(law)[0], parts.value(law, &line.end)];
+                of_law.stable(kind, ends, false)?.covector(0.0, line)
+            } else {
+                parts.jet(law, &line.z).1
+            };
+            let mut slope = parts.zeros();
+            for (c, parts) in along.iter().enumerate() {
+                let column = if self.is_discrete(law) {
+                    LawAlong { parts, law, line }.above_round_off(kind)
+                } else {
+                    parts.jet(law, &line.z).1
+                };
+                (0..parts.n()).for_each(|i| slope[(i, c)] = column[i]);
+            }
+            Some(WithJacobian { value, slope })
+        });
+        let w = w.all()?;
+        let columns = Columns::Parameters(parameters);
+        let jet = whole_velocity_jet(parts, &line.z, columns, &w)?;
+        let growth = growth(parts, h, &jet, &w);
+        let motion = jet.velocity.slope.map(|slope| slope * h);
+        motion.magnitude().is_finite().then_some(AlongParameters { motion, growth })
     }
 
     /// The residual with its Jacobian; `None` where it is not defined.

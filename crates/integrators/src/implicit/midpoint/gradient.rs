@@ -375,6 +375,21 @@ impl<L: Lengths> LawAlong<'_, L> {
         Some(Stable { mean, dmean, defect, change, rounding, noise })
     }
 
+    /// The discrete gradient of the derivative of a law along a parameter, on a vector space: of its defect what is above round-off.
+    pub(super) fn above_round_off(&self, kind: GradientKind) -> L::Vector {
+        let &Self { parts, law, line } = self;
+        let (mut w, d) = (self.mean(kind, false).value, line.d());
+        let [start, end] = [line.x, &line.end].map(|y| parts.value(law, y));
+        let defect = but_round_off(end - start - dot(&w, d), end.abs() + start.abs());
+        let square = dot(d, d);
+        if underflows(square) {
+            add(&mut w, 1.0, &along_short(defect, line));
+        } else {
+            add(&mut w, defect / square, d);
+        }
+        w
+    }
+
     /// The first and the second derivative of the law at both ends of the path, and the first in its middle.
     fn nodes(&self, kind: GradientKind, slope: f64) -> Option<([[f64; 2]; 2], f64)> {
         let &Self { parts, law, line } = self;

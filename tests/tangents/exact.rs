@@ -1,7 +1,7 @@
 //! Exact derivatives along parameters of systems in plain numbers: against those of the same families in types, against differences of
 //! runs, and refused where the answers of the model are wrong.
 
-use metriplectic::dynamics::{InNumbers, ModelError, SecondLaw};
+use metriplectic::dynamics::{InNumbers, Point};
 use metriplectic::equations::{
     Covectors, ENERGY, Equations, Jet, Kind, MetricError, Model, Part, Paths, Sizes,
 };
@@ -329,7 +329,7 @@ macro_rules! row {
                 let mut k = nalgebra::SMatrix::<Real, $n, $n>::zeros();
                 for i in 0..m {
                     let (p, u) = (m + i, 2 * m + i % baths);
-                    let rate = t[2] * x[u] * ((x[i] / unit).powi(2) * 0.3 + 1.0) / unit;
+                    let rate = t[2] * x[u] * ((x[i] / unit).powi(2) * 0.3 + 1.0) * unit;
                     let b = [w[u] / unit, -w[p] / unit];
                     for (r, along) in [(p, b[0]), (u, b[1])] {
                         for (c, other) in [(p, b[0]), (u, b[1])] {
@@ -384,7 +384,7 @@ fn agrees<D, M, const P: usize>(
     (family, names): (impl Fn(&SVector<f64, P>) -> D, &'static [&'static str; P]),
     theta: SVector<f64, P>,
     method: M,
-    (x, schedule): (&metriplectic::dynamics::Point<D>, Schedule),
+    (x, schedule): (&Point<D>, Schedule),
     bounds: Bounds,
 ) -> DMatrix<f64>
 where
@@ -452,75 +452,74 @@ const EXACT: Bounds = Bounds { typed: 1e-12, transposed: 1e-13 };
 /// The row with more methods than entries of types, which are compiled anew for each number of entries.
 #[test]
 fn derivatives_of_three_entries_along_parameters_are_exact() {
-    for unit in [1.0, 1e-9, 1e11] {
+    for (unit, is_followed) in [(1e-9, false), (1e11, false), (1.0, true)] {
         let row = row!(3, unit);
         let family = |t: &SVector<f64, 5>| row.at(*t);
         let (x, rest) = (generic::<3>(unit), resting::<3>(unit));
+        wrong_answers_are_refused(&family, [&x, &rest]);
+        start_alone_is_exact(&family, &x);
         macro_rules! everywhere {
             ($($method:expr),+ $(,)?) => {$(
                 let name = format!("3 entries of {unit:e}, {}", stringify!($method));
-                let span = Span::steps(0.1, 5);
+                let span = Span::steps(0.1, 2);
                 agrees(&name, (family, &NAMES), THETA, $method, (&x, span.into()), EXACT);
                 // Steps that follow a tolerance differ in their sizes by round-off.
-                let followed = Span::until(1.0).tolerance(1e-5).output_every(0.4).into();
-                let near = Bounds { typed: 1e-6, transposed: 1e-12 };
-                agrees(&name, (family, &NAMES), THETA, $method, (&x, followed), near);
+                if is_followed {
+                    let followed = Span::until(0.25).tolerance(1e-3).output_every(0.1).into();
+                    let near = Bounds { typed: 1e-6, transposed: 1e-12 };
+                    agrees(&name, (family, &NAMES), THETA, $method, (&x, followed), near);
+                }
                 // At rest, where the load has the value zero, nothing else moves it.
                 let theta = SVector::from([1.3, 2.0, 0.2, 1.1, 0.0]);
                 agrees(&name, (family, &NAMES), theta, $method, (&rest, span.into()), EXACT);
             )+};
         }
         everywhere!(
-            WeylMidpoint,
-            Scheme::new(ChartMidpoint),
-            Scheme::new(WeylMidpoint).gradient(MeanValue),
-            Scheme::new(WeylMidpoint).gradient(SymmetricItohAbe),
-            Gauss::<1>,
-            Gauss::<2>,
-            Gauss::<3>,
-            Radau::<2>,
-            Radau::<3>,
             DormandPrince5,
             DormandPrince8,
             RungeKuttaChebyshev,
             ExplicitRungeKutta::new(&KUTTA),
+            WeylMidpoint,
+            Radau::<2>,
+            Gauss::<2>,
+            Gauss::<3>,
+            Radau::<3>,
+            Scheme::new(WeylMidpoint).gradient(SymmetricItohAbe),
+            Scheme::new(WeylMidpoint).gradient(MeanValue),
+            Scheme::new(ChartMidpoint),
+            Gauss::<1>,
         );
         let theta = SVector::from([1.3, 2.0, 0.2, 1.1, 0.0]);
         let span = Span::steps(0.1, 3).into();
         let found = agrees("loaded", (family, &NAMES), theta, Gauss::<2>, (&rest, span), EXACT);
         // The load β pushes the mass for a time of 0.3.
         assert!(found[(1, 3 + 4)] > 0.2 * unit, "{found}");
-        start_alone_is_exact(&family, &x);
-        wrong_answers_are_refused(&family, [&x, &rest]);
+        against_runs(&family, &x);
     }
 }
 
 #[test]
 fn derivatives_of_many_entries_along_parameters_are_exact() {
-    for unit in [1.0, 1e-9, 1e11] {
+    for unit in [1e-9, 1e11] {
         let row = row!(11, unit);
         let family = |t: &SVector<f64, 5>| row.at(*t);
         let (name, x) = (format!("11 entries of {unit:e}"), generic::<11>(unit));
-        let span = Span::steps(0.1, 5);
         every_method!(
             name,
             (family, &NAMES),
             THETA,
             x,
-            span,
+            Span::steps(0.1, 2),
             EXACT,
-            [
-                WeylMidpoint,
-                Scheme::new(WeylMidpoint).gradient(SymmetricItohAbe),
-                Gauss::<2>,
-                DormandPrince8,
-            ]
+            [WeylMidpoint, Gauss::<2>, DormandPrince8,]
         );
-        against_runs(&family, &x);
+        let scheme = Scheme::new(WeylMidpoint).gradient(SymmetricItohAbe);
+        let span = Span::steps(0.1, 1);
+        every_method!(name, (family, &NAMES), THETA, x, span, EXACT, [scheme]);
     }
     let row = row!(24, 1e-9);
     let family = |t: &SVector<f64, 5>| row.at(*t);
-    let (x, span) = (generic::<24>(1e-9), Span::steps(0.1, 3));
+    let (x, span) = (generic::<24>(1e-9), Span::steps(0.1, 1));
     every_method!(
         "24 entries",
         (family, &NAMES),
@@ -530,7 +529,6 @@ fn derivatives_of_many_entries_along_parameters_are_exact() {
         EXACT,
         [WeylMidpoint, DormandPrince8,]
     );
-    against_runs(&family, &x);
 }
 
 /// Bodies with further invariants: Casimirs with and without friction.
@@ -557,7 +555,7 @@ fn derivatives_of_projections_along_parameters_are_those_in_types() {
     // Friction that keeps a function of the state, off which it is projected.
     let kept = Family::on(Euclidean::<4>)
         .parameters(BODY)
-        .bracket(metriplectic::dynamics::bracket::Zero)
+        .bracket(Zero)
         .energy(|x: &Vector4<Real>, t: &Vector3<Real>| {
             x.x * x.x * t.x * 0.5 + x.y.powi(4) * 0.3 + x.z * x.w + x.w
         })
@@ -585,17 +583,14 @@ fn derivatives_of_projections_along_parameters_are_those_in_types() {
 }
 
 /// Compares with differences of order 4 of whole runs, by every method.
-fn against_runs<D: Differentiable>(
-    family: &impl Fn(&SVector<f64, 5>) -> D,
-    x: &metriplectic::dynamics::Point<D>,
-) {
+fn against_runs<D: Differentiable>(family: &impl Fn(&SVector<f64, 5>) -> D, x: &Point<D>) {
     let build = |values: &[f64]| {
         let member = Member::of(family(&SVector::from_column_slice(values)));
         Ok::<_, ModelError>(FromEquations(member))
     };
     let system = SystemAt::listed(&NAMES, THETA.as_slice(), build).unwrap();
     let start = || Entries::from(D::Manifold::entries(x));
-    let span = Span::steps(0.1, 5);
+    let span = Span::steps(0.1, 2);
     macro_rules! compare {
         ($($method:expr),+ $(,)?) => {$({
             let run = $method.tangent(&system, start(), span).unwrap();
@@ -631,10 +626,7 @@ fn against_runs<D: Differentiable>(
 }
 
 /// A model that does not say how it depends on parameters has exact derivatives along its start, and differences along the parameters.
-fn start_alone_is_exact<D: Differentiable>(
-    family: &impl Fn(&SVector<f64, 5>) -> D,
-    x: &metriplectic::dynamics::Point<D>,
-) {
+fn start_alone_is_exact<D: Differentiable>(family: &impl Fn(&SVector<f64, 5>) -> D, x: &Point<D>) {
     let build = |known: usize| {
         move |values: &[f64]| {
             let typed = family(&SVector::from_column_slice(values));
@@ -650,14 +642,14 @@ fn start_alone_is_exact<D: Differentiable>(
                 let all = SystemAt::listed(&NAMES, THETA.as_slice(), build(5)).unwrap();
                 let some = SystemAt::listed(&NAMES, THETA.as_slice(), build(known)).unwrap();
                 let [exact, run] = [&all, &some]
-                    .map(|system| $method.tangent(system, start(), Span::steps(0.1, 5)).unwrap());
+                    .map(|system| $method.tangent(system, start(), Span::steps(0.1, 2)).unwrap());
                 let of_start = off(&run.last().along_start(), &exact.last().along_start());
                 let along = off(&run.last().along_parameters(), &exact.last().along_parameters());
                 println!("{}: start {of_start:.1e}, parameters {along:.1e}", stringify!($method));
                 assert!(of_start < 1e-12 && along < 1e-8, "{of_start:e} {along:e}");
                 let rows = |n: usize| vec![DVector::zeros(3); n - 1];
                 let [expected, found] = [&all, &some].map(|system| {
-                    let back = $method.adjoint(system, start(), Span::steps(0.1, 5)).unwrap();
+                    let back = $method.adjoint(system, start(), Span::steps(0.1, 2)).unwrap();
                     let mut rows = rows(back.states().len());
                     rows.push(DVector::from_vec(vec![0.3, -0.7, 0.2]));
                     back.pull_back(&rows).unwrap()
@@ -675,14 +667,14 @@ fn start_alone_is_exact<D: Differentiable>(
 /// Refuses answers that are wrong in a thousandth of one derivative.
 fn wrong_answers_are_refused<D: Differentiable>(
     family: &impl Fn(&SVector<f64, 5>) -> D,
-    states: [&metriplectic::dynamics::Point<D>; 2],
+    states: [&Point<D>; 2],
 ) {
-    let refused = |wrong: Wrong, x: &metriplectic::dynamics::Point<D>| {
+    let refused = |wrong: Wrong, (x, theta): (&Point<D>, [f64; 5])| {
         let build = |values: &[f64]| {
             let member = Member::of(family(&SVector::from_column_slice(values)));
             Ok::<_, ModelError>(FromEquations(Member { wrong, ..member }))
         };
-        let system = SystemAt::listed(&NAMES, THETA.as_slice(), build).unwrap();
+        let system = SystemAt::listed(&NAMES, &theta, build).unwrap();
         let start = || Entries::from(D::Manifold::entries(x));
         let tangent = DormandPrince8.tangent(&system, start(), Span::steps(0.1, 2)).map(drop);
         let adjoint = Gauss::<2>.adjoint(&system, start(), Span::steps(0.1, 2)).map(drop);
@@ -692,7 +684,9 @@ fn wrong_answers_are_refused<D: Differentiable>(
             other => panic!("{wrong:?}: {other:?}"),
         })
     };
-    for x in states {
+    // Without a load the state at rest stays there.
+    let [moving, rest] = states;
+    for x in [(moving, THETA.into()), (rest, [1.3, 2.0, 0.2, 1.1, 0.0])] {
         assert_eq!(refused(Wrong::Nothing, x), [None, None]);
         let cases = [
             (Wrong::Value, "energy", 0),

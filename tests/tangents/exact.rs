@@ -646,7 +646,7 @@ fn start_alone_is_exact<D: Differentiable>(family: &impl Fn(&SVector<f64, 5>) ->
                 let of_start = off(&run.last().along_start(), &exact.last().along_start());
                 let along = off(&run.last().along_parameters(), &exact.last().along_parameters());
                 println!("{}: start {of_start:.1e}, parameters {along:.1e}", stringify!($method));
-                assert!(of_start < 1e-12 && along < 1e-8, "{of_start:e} {along:e}");
+                assert!(of_start < 1e-12 && along < 1e-7, "{of_start:e} {along:e}");
                 let rows = |n: usize| vec![DVector::zeros(3); n - 1];
                 let [expected, found] = [&all, &some].map(|system| {
                     let back = $method.adjoint(system, start(), Span::steps(0.1, 2)).unwrap();
@@ -657,7 +657,7 @@ fn start_alone_is_exact<D: Differentiable>(family: &impl Fn(&SVector<f64, 5>) ->
                 let error = (found.along_start() - expected.along_start()).amax();
                 assert!(error < 1e-12 * expected.along_start().amax(), "{error:e}");
                 let error = (found.along_parameters() - expected.along_parameters()).amax();
-                assert!(error < 1e-8 * expected.along_parameters().amax(), "{error:e}");
+                assert!(error < 1e-7 * expected.along_parameters().amax(), "{error:e}");
             }
         )+};
     }

@@ -16,8 +16,10 @@
 //! | `factor`, `layout`, `paths` | the charts and paths of the factors of a space, side by side |
 //! | `law`, `field`, `tapes` | tapes as functions and as tensors on a space |
 //! | `bracket`, `friction`, `metric`, `normals` | the parts of the motion |
+//! | `along` | the derivatives along parameters |
 
 mod algebra;
+mod along;
 mod bracket;
 pub mod definition;
 pub mod error;

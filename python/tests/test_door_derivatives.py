@@ -43,6 +43,62 @@ def test_a_tangent_along_the_start_alone_is_exact():
     assert found.along == {}
 
 
+def oscillation(k, n, h):
+    """The position of an oscillator after n midpoint steps from q = 1, and its derivative along the stiffness k: a step turns q + i p/ω by
+    2 atan(ωh/2)."""
+    omega = np.sqrt(k)
+    angle, slope = 2 * np.arctan(omega * h / 2), h / (1 + (omega * h / 2) ** 2) / (2 * omega)
+    return np.cos(n * angle), -n * np.sin(n * angle) * slope
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9, 1e11])
+def test_gradients_along_parameters_are_those_of_a_closed_form(unit):
+    system = mp.System(
+        mp.R(2), energy=lambda x, k: 0.5 * (x[1] ** 2 + k * x[0] ** 2), poisson="symplectic", parameters={"k": 2.3}
+    )
+    options = dict(t=2.0, h=0.1, method="midpoint")
+    exact, slope = oscillation(2.3, 20, 0.1)
+    start = [unit, 0.0]
+    found = system.tangent(start, **options)
+    assert found.y[-1, 0] == pytest.approx(unit * exact, rel=1e-12)
+    assert found.along["k"][-1, 0] == pytest.approx(unit * slope, rel=1e-12)
+    value, _, parameters = system.gradient(lambda y: y[-1, 0] ** 2 / unit**2, start, **options)
+    assert value == pytest.approx(exact**2, rel=1e-12)
+    assert parameters["k"] == pytest.approx(2 * exact * slope, rel=1e-12)
+    weights = np.zeros((21, 2))
+    weights[-1, 0] = 1.0 / unit
+    _, slopes = system.run(start, **options).vjp(weights)
+    assert slopes["k"] == pytest.approx(slope, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["dp8", "dp5", "chebyshev", "midpoint", "gauss2", "radau2"])
+def test_every_part_of_a_recorded_system_has_exact_derivatives_along_parameters(method):
+    # The bracket is β J, the friction a recorded matrix, and the entropy c ln u. A parameter that is not asked for stays as it is.
+    def friction(x, w, gamma):
+        b = np.stack([0.0, w[2], -w[1]])
+        return gamma * x[2] * np.outer(b, b)
+
+    def form(x, beta):
+        return beta * np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+    theta = {"gamma": 0.3, "beta": 1.2, "c": 2.0}
+    system = mp.System(
+        mp.R(3), energy=lambda x, beta: 0.5 * x[1] ** 2 - np.cos(beta * x[0]) + x[2], entropy=lambda x, c: c * np.log(x[2]),
+        poisson=form, friction=friction, parameters=theta,
+    )
+    options = dict(t=1.0, h=0.1, method=method)
+    start, names = [1.2, 0.1, 1.5], ["c", "gamma"]
+    found = system.tangent(start, along=names, **options)
+    exact = differences(
+        lambda p: system(c=p[0], gamma=p[1]).run(start, **options).y[-1], [theta[name] for name in names], 1e-3
+    )
+    assert np.allclose(np.stack([found.along[name][-1] for name in names], axis=1), exact, atol=1e-10)
+    every = system.tangent(start, **options)
+    exact = differences(lambda p: system(beta=p[0]).run(start, **options).y[-1], [1.2], 1e-3)
+    assert np.allclose(every.along["beta"][-1], exact[:, 0], atol=1e-10)
+    assert every.sensitivity["energy"] < 1e-12
+
+
 def test_a_tangent_of_a_sphere_has_entries_as_rows():
     system = mp.System(mp.sphere(2), energy=lambda n: n[2], poisson="area")
     # The area form turns a spin about the third axis, with the angle t: so do tangents.

@@ -5,10 +5,9 @@ use std::fmt;
 
 use metriplectic::fields::Space;
 use metriplectic::integrators::explicit::ExplicitMemory;
-use metriplectic::integrators::midpoint::MidpointMemory;
 use metriplectic::integrators::{
-    Control, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal, RestoreError,
-    Saved, StageFlow, StageMemory, StepEnds, StepStart, Taken,
+    Control, Element, Flow, LimitingSites, Memory, MethodError, MidpointMemory, Promises, Refusal,
+    RestoreError, Saved, StageFlow, StageMemory, StepEnds, StepStart, Taken,
 };
 use metriplectic::prelude::*;
 

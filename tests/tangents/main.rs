@@ -1,6 +1,8 @@
 //! Tangents of systems of any kind: in plain numbers, and by differences of steps.
 
 mod beside;
+mod corners;
+mod exact;
 mod families;
 mod in_numbers;
 mod parameters;

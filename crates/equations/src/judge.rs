@@ -23,6 +23,7 @@ mod invariants;
 mod metric;
 mod motion;
 mod numbers;
+mod parameters;
 mod reached;
 pub(crate) mod sampling;
 mod sums;
@@ -32,6 +33,7 @@ mod unbracketed;
 pub use self::balance::Violation;
 pub use self::bracket::BracketDefects;
 pub use self::derivatives::{Derivatives, Mismatch, OF_SOLUTIONS, Rounding, Values};
+pub use self::parameters::ModelBeside;
 pub use self::sampling::CoordinateScales;
 pub use self::table::Row;
 
@@ -155,6 +157,22 @@ impl<'a> Judge<'a> {
     /// [`ModelError::WrongDerivative`].
     pub fn look_at_derivatives(&self, x: &[f64], turn: usize) -> Result<(), ModelError> {
         self.at(x).map_or_else(|motion| motion.look(turn), |at| reached::look(at, turn))
+    }
+
+    /// Compares the derivatives of a model along its [parameters](Model::parameters) with the values of the models beside it, at a state
+    /// and at one near it. `values` are those of the parameters, and `beside` calls its function with the model whose parameters are
+    /// displaced by the numbers it is given; it returns `false` where there is none. A model that knows none of them is not asked.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::WrongAlongParameter`], and [`ModelError::DerivativeNotFinite`] where an answer is not a number.
+    pub fn check_parameters(
+        &self,
+        x: &[f64],
+        values: &[f64],
+        beside: ModelBeside<'_>,
+    ) -> Result<(), ModelError> {
+        self.at(x).map_or(Ok(()), |at| parameters::compare(at, values, beside))
     }
 
     /// Looks for a broken law at a state, around it, and at the states `ahead`. States without values are left out.

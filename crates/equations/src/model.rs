@@ -43,7 +43,8 @@ pub struct Jet<'a> {
 /// Displacements `q` and covectors are in the frame of the chart at `x`, also where a part is evaluated at `φ_x(q)`.
 ///
 /// Laws ([`laws::model`](crate::laws::model)): 1. the parts add up to the velocity; 2. the columns of a tensor are the vectors of
-/// its part; 3. derivatives are those of the values; 4. a Hessian is symmetric, and the derivative of the differential.
+/// its part; 3. derivatives are those of the values; 4. a Hessian is symmetric, and the derivative of the differential; 5. derivatives
+/// along [parameters](Self::parameters) are those of the values ([`Judge::check_parameters`](crate::judge::Judge::check_parameters)).
 pub trait Model: Equations {
     /// Returns whether a part is zero by construction.
     fn is_zero(&self, part: Part) -> bool;
@@ -287,6 +288,50 @@ pub trait Model: Equations {
         alpha: &[f64],
         slope: &mut [f64],
     ) -> Result<(), MetricError>;
+
+    /// Returns the number of parameters `θ` along which the model knows the derivatives of its laws and of its parts; 0 for one that knows
+    /// none. Then those of its steps are exact along parameters too, on a vector space with the canonical metric, where a
+    /// [derivative by differences](Self::has_derivatives_by_differences) is not.
+    ///
+    /// The parameters are those of the systems at whose values the model stands, in their order.
+    fn parameters(&self) -> usize {
+        0
+    }
+
+    /// Computes the derivative `∂F/∂θ_k` of one law along a parameter, counted from 0, and that of its differential, `∂dF/∂θ_k`, at a
+    /// state. The default is not a number.
+    fn law_along_parameter(
+        &self,
+        law: usize,
+        parameter: usize,
+        t: f64,
+        x: &[f64],
+        df: &mut [f64],
+    ) -> f64 {
+        let _ = (law, parameter, t, x);
+        df.fill(f64::NAN);
+        f64::NAN
+    }
+
+    /// Computes the derivative of the vector `Π α`, `f(w)` or `K_w α` of a part along a parameter, counted from 0, at a state with
+    /// covectors that stay as they are. The default is not a number.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn part_along_parameter(
+        &self,
+        (part, parameter): (Part, usize),
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) -> Result<(), MetricError> {
+        let _ = (part, parameter, t, x, w, alpha);
+        v.fill(f64::NAN);
+        Ok(())
+    }
 
     /// Computes the velocity with which the symmetry of a momentum moves a state, in the chart there, and where it moves it at the
     /// time 0; returns `false` if the invariant comes without one.

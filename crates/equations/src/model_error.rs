@@ -51,6 +51,24 @@ pub enum ModelError {
         /// The difference quotient of the values.
         quotient: f64,
     },
+    /// A derivative along a parameter is not that of the values.
+    #[error(
+        "the {field} has the derivative {derivative:.6e} along parameter {parameter}, counted from 0, at {point:?}, but its values \
+         change at the rate {quotient:.6e}: correct `Model::law_along_parameter` and `Model::part_along_parameter`; where the parameters \
+         of the systems are not those of the model, return 0 from `Model::parameters`"
+    )]
+    WrongAlongParameter {
+        /// Which part of the model.
+        field: &'static str,
+        /// The parameter, counted from 0.
+        parameter: usize,
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The derivative that the model answers.
+        derivative: f64,
+        /// The difference quotient of the values.
+        quotient: f64,
+    },
     /// The model has values at too few points around the start.
     #[error(
         "the model was judged at {judged} of {wanted} points around {point:?}, because it has no values at \

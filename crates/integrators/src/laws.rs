@@ -9,7 +9,7 @@ use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
 use crate::explicit::Tableau;
 use crate::explicit::conditions::{Conditions, highest};
-use crate::midpoint::{MidpointMemory, Scheme};
+use crate::midpoint::Scheme;
 use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
 use crate::run::method::Method;
 use crate::run::schedule::Schedule;
@@ -309,7 +309,7 @@ where
     W: DiscreteGradient,
 {
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
-    let (start, mut memory) = (StepStart::first(system, x), MidpointMemory::default());
+    let (start, mut memory) = (StepStart::first(system, x), Stepper::<Y>::memory(scheme));
     scheme.step(&start, h, &mut memory).map(|taken| taken.x).map_err(missing)
 }
 

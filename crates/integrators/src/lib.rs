@@ -101,4 +101,4 @@ pub use tangent::{
     LinearisedAlong, LossGradient, SelfAdjoint, Sensitivity, SystemAt, Systems, TangentError,
     TangentEvent, TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
 };
-pub use typed::StageMemory;
+pub use typed::{MidpointMemory, StageMemory};

@@ -6,7 +6,7 @@ pub mod certificate;
 mod checked;
 pub mod checkpoint;
 pub mod controller;
-mod corners;
+pub(crate) mod corners;
 mod course;
 mod departure;
 mod direction;

@@ -20,8 +20,11 @@
 //! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts, or such a retraction alone | two linearisations of its own equation, from either end |
 //! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
 //! | [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | the implicit function theorem at the root, with its residual at dual numbers |
-//! | these of a [model](metriplectic_equations::Model) in plain numbers on a vector space | the same, with the derivatives of the model |
-//! | of any other kind of system: open, noisy, a lattice, at [values of parameters](Systems) | differences of steps beside the step, to some ten digits |
+//! | these of a [model](metriplectic_equations::Model) in plain numbers on a vector space | the same, with the derivatives of the model, and along the [parameters](metriplectic_equations::Model::parameters) that it knows |
+//! | of any other kind of system: open, noisy, a lattice; along parameters that a model does not know | differences of steps beside the step, to some ten digits |
+//!
+//! [Corners](crate::Watch::corners) of a law in time stay where they are, and the tangent crosses them: the work at the frozen state has a
+//! derivative of its own. In steps beside a corner the column of the clock of an open system is that of the motion, to the error of a step.
 //!
 //! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!
@@ -38,6 +41,7 @@ mod differentiated;
 mod duals;
 mod error;
 mod event;
+mod exact;
 mod explicit;
 mod factors;
 mod families;
@@ -51,6 +55,7 @@ mod of_open;
 mod parameters;
 mod part;
 mod pieces;
+mod product;
 mod record;
 mod refined;
 mod saltation;
@@ -74,6 +79,7 @@ pub use columns::{Carried, Columns, LawRows, Moved};
 pub use differentiated::Differentiated;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
+pub use exact::ExactSteps;
 pub use families::{
     BathOf, BuildMember, Depends, FamilySurroundings, Fittable, InTimeOf, OpenFamily,
     SurroundingsOf,

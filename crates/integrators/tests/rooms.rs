@@ -33,7 +33,7 @@ const ROOMS: [(&str, &[&str]); 20] = [
             "numbers",
         ],
     ),
-    ("typed", &["step", "collocation", "numbers", "implicit"]),
+    ("typed", &["step", "discrete_gradient", "midpoint", "collocation", "numbers", "implicit"]),
     ("compiled", &["step", "explicit", "numbers", "implicit"]),
     ("run", &["step", "round_off", "numbers", "implicit", "compiled"]),
     ("noise", &["step", "explicit", "numbers"]),

@@ -152,11 +152,7 @@ impl SiteVector {
     }
 
     /// Visits the sites of a range block by block, with the numbers of each vector from the block on.
-    fn in_blocks<const K: usize>(
-        vectors: [&Self; K],
-        sites: Range<usize>,
-        visit: &mut dyn FnMut([&[f64]; K], Range<usize>),
-    ) {
+    fn in_blocks<const K: usize>(vectors: [&Self; K], sites: Range<usize>, visit: Visit<'_, K>) {
         let stride = vectors[0].stride;
         let length = stride * blocks::sites_of(stride).min(sites.len());
         let mut tiles: [Room<f64>; K] = std::array::from_fn(|_| Room::of(stride, 0.0));
@@ -226,6 +222,9 @@ fn both_larger<const M: usize>(mut most: [f64; M], part: [f64; M]) -> [f64; M] {
 /// A function of the numbers that `K` vectors have at the same place, for a row of places. It is behind a pointer, so that what is
 /// done with all sites is compiled once, and not with each function.
 type Rows<'a, const K: usize, R> = &'a (dyn Fn([&[f64]; K], &mut [R]) + Sync);
+
+/// A visitor of blocks of sites, with the numbers that `K` vectors have from the block on.
+type Visit<'a, const K: usize> = &'a mut dyn FnMut([&[f64]; K], Range<usize>);
 
 /// Writes a function of numbers that stand at the same place. The places it writes to are none of those it reads, which the
 /// compiler knows of arguments alone. Loops over indices, of which the compiler makes less than of iterators.

@@ -438,7 +438,7 @@ impl RawSystem {
                 return asked.tangent(&open, &open, p, names, Derivatives::Start);
             }
             let kept = Beside::default();
-            let build = |theta: &[f64]| {
+            let build = |theta: &[f64], _: bool| {
                 let open = self.open_with(self.kept(&kept, theta)?, theta, look);
                 open.ok_or_else(|| bad("the system is closed"))
             };
@@ -451,7 +451,14 @@ impl RawSystem {
             return asked.tangent(&closed, &closed, p, names, Derivatives::Start);
         }
         let kept = Beside::default();
-        let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
+        let build = |theta: &[f64], is_here: bool| {
+            let parts = if is_here {
+                self.parts_along(theta, &along.places)
+            } else {
+                self.kept(&kept, theta)
+            };
+            Ok(self.closed_with(parts?, look))
+        };
         self.along_parameters(along, &build, &|system| {
             asked.tangent(system, &**system, p, names, Derivatives::Parameters)
         })
@@ -465,7 +472,7 @@ impl RawSystem {
                 return asked.gradient(&open, &open, p, names, (weigh, Derivatives::Start));
             }
             let kept = Beside::default();
-            let build = |theta: &[f64]| {
+            let build = |theta: &[f64], _: bool| {
                 let open = self.open_with(self.kept(&kept, theta)?, theta, look);
                 open.ok_or_else(|| bad("the system is closed"))
             };
@@ -478,17 +485,25 @@ impl RawSystem {
             return asked.gradient(&closed, &closed, p, names, (weigh, Derivatives::Start));
         }
         let kept = Beside::default();
-        let build = |theta: &[f64]| Ok(self.closed_with(self.kept(&kept, theta)?, look));
+        let build = |theta: &[f64], is_here: bool| {
+            let parts = if is_here {
+                self.parts_along(theta, &along.places)
+            } else {
+                self.kept(&kept, theta)
+            };
+            Ok(self.closed_with(parts?, look))
+        };
         self.along_parameters(along, &build, &|system| {
             asked.gradient(system, &**system, p, names, (weigh, Derivatives::Parameters))
         })
     }
 
-    /// Calls `work` with the system whose parameters have derivatives.
+    /// Calls `work` with the system whose parameters have derivatives, from a function that builds the one at values of all parameters;
+    /// it is told whether they are those of the run, and not beside these.
     fn along_parameters<F, T>(
         &self,
         along: &Along,
-        build: &dyn Fn(&[f64]) -> PyResult<F>,
+        build: &dyn Fn(&[f64], bool) -> PyResult<F>,
         work: &dyn Fn(&SystemAt<'_, F>) -> PyResult<T>,
     ) -> PyResult<T> {
         let Along { places, sizes, names } = along;
@@ -498,7 +513,7 @@ impl RawSystem {
             for ((&place, phi), size) in places.iter().zip(phi).zip(sizes) {
                 theta[place] += phi - size;
             }
-            build(&theta)
+            build(&theta, phi == sizes.as_slice())
         };
         work(&SystemAt::listed(names, sizes, displaced)?)
     }

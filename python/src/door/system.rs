@@ -163,6 +163,14 @@ impl RawSystem {
         Ok(Arc::new(system))
     }
 
+    /// The recorded system at these parameters, with its derivatives along those at these places.
+    pub(crate) fn parts_along(&self, theta: &[f64], places: &[usize]) -> PyResult<Parts> {
+        let system = Recorded::new(Arc::clone(&self.definition), theta);
+        let system = system.and_then(|system| system.along(places));
+        let system = system.map_err(|error| ModelError::new_err(in_python(&error.to_string())))?;
+        Ok(Arc::new(system))
+    }
+
     /// The system of a run.
     fn supervised(&self, parts: Parts, look: &Arc<Look>) -> Interruptible {
         Interruptible::new(parts, Arc::clone(look), self.is_verified)

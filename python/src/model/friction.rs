@@ -140,6 +140,16 @@ impl Rub {
         matches!(self.kind, RubKind::Metric { .. })
     }
 
+    /// Computes the vector of the friction of a metric without its factor.
+    pub(super) fn unscaled(
+        around: &Around,
+        x: &[f64],
+        covectors: [&[f64]; 2],
+        v: &mut [f64],
+    ) -> Result<(), MetricError> {
+        of_metric(around, None, 0.0, x, covectors, v)
+    }
+
     /// Returns whether it depends on the time.
     pub(super) fn in_time(&self) -> bool {
         match &self.kind {

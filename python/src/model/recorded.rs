@@ -12,6 +12,7 @@ use metriplectic_equations::{
 use metriplectic_fields::Real;
 use metriplectic_recording::Tape;
 
+use super::along::{Along, law_of};
 use super::bracket::Poisson;
 use super::definition::{self, Definition};
 use super::error::DefinitionError;
@@ -30,6 +31,8 @@ use super::tapes::{self, OfState};
 #[derive(Clone)]
 pub struct Recorded {
     inner: Arc<Bound>,
+    /// The parameters along which it knows its derivatives.
+    along: Option<Arc<Along>>,
 }
 
 /// The parts of a system with the values of the parameters in them.
@@ -125,7 +128,7 @@ impl Recorded {
             in_time,
             definition: Arc::clone(&definition),
         };
-        Ok(Self { inner: Arc::new(inner) })
+        Ok(Self { inner: Arc::new(inner), along: None })
     }
 
     /// Makes the same system at other values of its parameters.
@@ -135,6 +138,18 @@ impl Recorded {
     /// [`DefinitionError`] with another number of parameters, or one that is not finite.
     pub fn at(&self, theta: &[f64]) -> Result<Self, DefinitionError> {
         Self::new(Arc::clone(&self.inner.definition), theta)
+    }
+
+    /// Makes the same system with its derivatives along the parameters at these places, on a flat space with the canonical metric; it
+    /// knows none elsewhere.
+    ///
+    /// # Errors
+    ///
+    /// [`DefinitionError`] if a tape grows too large.
+    pub fn along(&self, places: &[usize]) -> Result<Self, DefinitionError> {
+        let is_known = self.layout().is_flat && self.inner.around.metric.is_none();
+        let along = is_known.then(|| Along::of(&self.inner.definition, places).map(Arc::new));
+        Ok(Self { inner: Arc::clone(&self.inner), along: along.transpose()? })
     }
 
     /// The definition.
@@ -562,6 +577,52 @@ impl Model for Recorded {
         slope: &mut [f64],
     ) -> Result<(), MetricError> {
         self.inner.bracket.slope_of(t, x, u, alpha, slope)
+    }
+
+    fn parameters(&self) -> usize {
+        self.along.as_ref().map_or(0, |along| along.places.len())
+    }
+
+    fn law_along_parameter(
+        &self,
+        law: usize,
+        parameter: usize,
+        t: f64,
+        x: &[f64],
+        df: &mut [f64],
+    ) -> f64 {
+        df.fill(f64::NAN);
+        let Some(along) = &self.along else { return f64::NAN };
+        let Some(tape) = law_of(&self.inner.definition, law) else {
+            df.fill(0.0);
+            return 0.0;
+        };
+        Along::law(tape, (along.places[parameter], &self.inner.theta), t, x, df)
+    }
+
+    fn part_along_parameter(
+        &self,
+        (part, parameter): (Part, usize),
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) -> Result<(), MetricError> {
+        v.fill(f64::NAN);
+        let Some(along) = &self.along else { return Ok(()) };
+        let (at, covectors) = ((along.places[parameter], &self.inner.theta[..]), [w.energy, alpha]);
+        let mut unscaled = Ok(());
+        match part {
+            Part::Reversible => along.bracket(at, t, x, alpha, v),
+            Part::Gyroscopic => v.fill(0.0),
+            Part::Irreversible => {
+                let of_metric =
+                    |v: &mut [f64]| unscaled = Rub::unscaled(&self.inner.around, x, covectors, v);
+                along.friction(at, t, x, covectors, of_metric, v);
+            }
+        }
+        unscaled
     }
 
     /// Returns `false`: an invariant comes without its symmetry.

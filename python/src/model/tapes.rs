@@ -153,10 +153,34 @@ pub(super) fn product(
     n: usize,
     layout: Layout<'_>,
 ) -> Result<Tape, TapeError> {
-    let inputs = layout.states + 1 + n;
+    let source = |input| layout.source(input, layout.states);
+    product_from(tape, form, n, (layout.states, 0), source)
+}
+
+/// Makes the same tape with the inputs `[x | t | α | θ]`, with so many numbers before the time and so many parameters.
+pub(super) fn product_of_parameters(
+    tape: &Tape,
+    form: Form,
+    n: usize,
+    states: usize,
+    parameters: usize,
+) -> Result<Tape, TapeError> {
+    let source = |input: usize| Source::Input(if input > states { input + n } else { input });
+    product_from(tape, form, n, (states, parameters), source)
+}
+
+/// Makes the tape of the vector `A α` from that of the matrix and the sources of its inputs.
+fn product_from(
+    tape: &Tape,
+    form: Form,
+    n: usize,
+    (states, parameters): (usize, usize),
+    source: impl Fn(usize) -> Source,
+) -> Result<Tape, TapeError> {
+    let inputs = states + 1 + n + parameters;
     let mut listing = Listing { inputs, code: Vec::with_capacity(tape.registers() + 2 * n) };
-    let entries = listing.append(tape, |input| layout.source(input, layout.states))?;
-    let alpha = (0..n).map(|j| place(layout.states + 1 + j)).collect::<Result<Vec<u32>, _>>()?;
+    let entries = listing.append(tape, source)?;
+    let alpha = (0..n).map(|j| place(states + 1 + j)).collect::<Result<Vec<u32>, _>>()?;
     let mut outputs = Vec::with_capacity(n);
     match form {
         Form::Rows => {

@@ -179,6 +179,6 @@ impl Along<'_, '_> {
 }
 
 /// A covector that involves every column of a tensor.
-fn generic(units: &[f64]) -> Row {
+pub(super) fn generic(units: &[f64]) -> Row {
     units.iter().enumerate().map(|(i, unit)| (1.0 + i as f64).sin() / unit).collect()
 }

@@ -4,8 +4,13 @@ use std::fmt;
 use std::ops::{Index, IndexMut};
 
 use metriplectic_fields::length;
+use smallvec::SmallVec;
 
 use crate::numbers::{Lengths, List};
+
+/// The number of variables up to which sums are taken in the order of types, term by term.
+/// A factor of four fails `implicit/algebra.rs::sums_of_few_numbers_have_the_bits_of_types`.
+pub(super) const FEW: usize = 8;
 
 /// The vector of `n` numbers that are given by their index.
 #[inline]
@@ -21,6 +26,41 @@ pub(super) fn dot(a: &impl List, b: &impl List) -> f64 {
     let mut terms = a.numbers().iter().zip(b.numbers()).map(|(a, b)| a * b);
     let first = terms.next().unwrap_or(0.0);
     terms.fold(first, |sum, term| sum + term)
+}
+
+/// `Σ_j f(a_ij) v_j` for the rows of a matrix, four rows at once and each in two sums, which the processor adds at once.
+fn times_rows(a: &[f64], v: &[f64], to: &mut [f64], f: impl Fn(f64) -> f64) {
+    let n = v.len();
+    let (pairs, last) = v.as_chunks::<2>();
+    let mut fours = a.chunks_exact(4 * n);
+    let mut of_fours = to.chunks_exact_mut(4);
+    for (rows, to) in fours.by_ref().zip(of_fours.by_ref()) {
+        let rows: [&[f64]; 4] = std::array::from_fn(|i| &rows[i * n..(i + 1) * n]);
+        let mut sums = [[0.0; 2]; 4];
+        let halves = rows.map(|row| row.as_chunks::<2>().0);
+        let halves = halves.map(|row| &row[..pairs.len()]);
+        for (j, v) in pairs.iter().enumerate() {
+            for (sums, row) in sums.iter_mut().zip(&halves) {
+                *sums = [sums[0] + f(row[j][0]) * v[0], sums[1] + f(row[j][1]) * v[1]];
+            }
+        }
+        for ((to, sums), row) in to.iter_mut().zip(sums).zip(rows) {
+            let rest = last.iter().zip(&row[n - last.len()..]);
+            *to = rest.fold(sums[0] + sums[1], |sum, (v, a)| sum + f(*a) * v);
+        }
+    }
+    let others = fours.remainder().chunks_exact(n).zip(of_fours.into_remainder());
+    for (row, to) in others {
+        *to = row.iter().zip(v).fold(0.0, |sum, (a, v)| sum + f(*a) * v);
+    }
+}
+
+/// The numbers of a row from its first to its last that is not zero, with the place of the first.
+fn extent(row: &[f64]) -> (usize, &[f64]) {
+    let is_number = |a: &f64| *a != 0.0;
+    let Some(first) = row.iter().position(is_number) else { return (0, &[]) };
+    let end = row.iter().rposition(is_number).map_or(first, |last| last + 1);
+    (first, &row[first..end])
 }
 
 /// `Σ_i |a_i| |b_i|`.
@@ -140,15 +180,14 @@ impl<L: Lengths> Matrix<L> {
 
     /// A function of each entry.
     #[inline]
-    pub(super) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
-        let mut matrix = self.clone();
-        matrix.numbers_mut().iter_mut().for_each(|a| *a = f(*a));
-        matrix
+    pub(super) fn map(mut self, f: impl Fn(f64) -> f64) -> Self {
+        self.numbers_mut().iter_mut().for_each(|a| *a = f(*a));
+        self
     }
 
     /// The absolute values.
     #[inline]
-    pub(super) fn abs(&self) -> Self {
+    pub(super) fn abs(self) -> Self {
         self.map(f64::abs)
     }
 
@@ -172,6 +211,10 @@ impl<L: Lengths> Matrix<L> {
     #[inline]
     pub(super) fn times(&self, v: &L::Vector) -> L::Vector {
         let mut product = L::Vector::room(|| self.n());
+        if self.n() > FEW {
+            times_rows(self.numbers(), v.numbers(), product.numbers_mut(), |a| a);
+            return product;
+        }
         for (row, to) in self.rows().zip(product.numbers_mut()) {
             let mut terms = row.iter().zip(v.numbers()).map(|(a, v)| a * v);
             let first = terms.next().unwrap_or(0.0);
@@ -184,6 +227,10 @@ impl<L: Lengths> Matrix<L> {
     #[inline]
     pub(super) fn abs_times(&self, v: &L::Vector) -> L::Vector {
         let mut product = L::Vector::room(|| self.n());
+        if self.n() > FEW {
+            times_rows(self.numbers(), v.numbers(), product.numbers_mut(), f64::abs);
+            return product;
+        }
         for (row, to) in self.rows().zip(product.numbers_mut()) {
             let mut terms = row.iter().zip(v.numbers()).map(|(a, v)| a.abs() * v);
             let first = terms.next().unwrap_or(0.0);
@@ -210,6 +257,9 @@ impl<L: Lengths> Matrix<L> {
     /// `A B`.
     #[inline]
     pub(super) fn product(&self, other: &Self) -> Self {
+        if self.n() > FEW {
+            return self.sparse_product(other);
+        }
         let mut product = Self::zeros(self.n());
         for (row, to) in self.rows().zip(product.rows_mut()) {
             for (k, (a, other)) in row.iter().zip(other.rows()).enumerate() {
@@ -217,6 +267,22 @@ impl<L: Lengths> Matrix<L> {
                 if k == 0 {
                     to.for_each(|(to, b)| *to = a * b);
                 } else {
+                    to.for_each(|(to, b)| *to += a * b);
+                }
+            }
+        }
+        product
+    }
+
+    /// `A B` without the zeros of `A`, and those at both ends of the rows of `B`: Hessians of chains and constant tensors have few other
+    /// numbers.
+    fn sparse_product(&self, other: &Self) -> Self {
+        let mut product = Self::zeros(self.n());
+        let extents: SmallVec<[(usize, &[f64]); 64]> = other.rows().map(extent).collect();
+        for (row, to) in self.rows().zip(product.rows_mut()) {
+            for (a, (first, other)) in row.iter().zip(&extents) {
+                if *a != 0.0 {
+                    let to = to[*first..].iter_mut().zip(*other);
                     to.for_each(|(to, b)| *to += a * b);
                 }
             }
@@ -272,16 +338,23 @@ impl<L: Lengths> Matrix<L> {
             let (above, below) = a.split_at_mut((k + 1) * n);
             let (known, unknown) = right.split_at_mut((k + 1) * columns);
             let (above, known) = (&above[k * n..], &known[k * columns..]);
+            // Rows of the identity fill up from their beginning.
+            let (first, known) = if n > FEW { extent(known) } else { (0, known) };
             for (row, x) in below.chunks_exact_mut(n).zip(unknown.chunks_exact_mut(columns)) {
                 let factor = row[k] / above[k];
+                if n > FEW && factor == 0.0 {
+                    continue;
+                }
                 less(&mut row[k + 1..], factor, &above[k + 1..]);
-                less(x, factor, known);
+                less(&mut x[first..], factor, known);
             }
         }
         for i in (0..n).rev() {
             let (x, known) = right[i * columns..].split_at_mut(columns);
             for (k, known) in (i + 1..n).zip(known.chunks_exact(columns)) {
-                less(x, a[i * n + k], known);
+                if n <= FEW || a[i * n + k] != 0.0 {
+                    less(x, a[i * n + k], known);
+                }
             }
             x.iter_mut().for_each(|x| *x /= a[i * n + i]);
         }
@@ -300,5 +373,68 @@ impl<L: Lengths> Matrix<L> {
         let mut inverse = Self::scaled_one(self.n(), 1.0);
         self.solve_columns(inverse.numbers_mut(), self.n())?;
         Some(inverse)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::AtRunTime;
+    use crate::step::Directions;
+
+    /// A matrix with zeros inside of its rows and at their ends, and with one row of zeros.
+    fn matrix(n: usize, seed: f64) -> Matrix<AtRunTime> {
+        let entry = |i: usize, j: usize| (seed + 1.7 * i as f64 + 0.9 * (i * j) as f64).sin();
+        let is_zero = |i: usize, j: usize| i == 2 || (i + 2 * j).is_multiple_of(3) || j + 4 < i;
+        Matrix::of(n, |i, j| if is_zero(i, j) { 0.0 } else { entry(i, j) })
+    }
+
+    #[test]
+    fn products_of_many_numbers_are_those_of_their_definition() {
+        for n in [3, 8, 9, 10, 11, 12, 15] {
+            let (a, b) = (matrix(n, 0.3), matrix(n, 1.1));
+            let v = vector::<Directions>(n, |i| (0.4 + i as f64).cos());
+            let (product, times, sizes) = (a.product(&b), a.times(&v), a.abs_times(&v));
+            // Sums of up to fifteen numbers of order one.
+            let near = |x: f64, y: f64| (x - y).abs() <= 15.0 * f64::EPSILON;
+            for i in 0..n {
+                assert!(near(times[i], (0..n).map(|k| a[(i, k)] * v[k]).sum()), "{n}, {i}");
+                assert!(near(sizes[i], (0..n).map(|k| a[(i, k)].abs() * v[k]).sum()), "{n}, {i}");
+                for j in 0..n {
+                    let sum = (0..n).map(|k| a[(i, k)] * b[(k, j)]).sum();
+                    assert!(near(product[(i, j)], sum), "{n}, {i}, {j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sums_of_few_numbers_have_the_bits_of_types() {
+        let in_order = |n: usize| {
+            let a: Matrix<AtRunTime> = Matrix::of(n, |i, j| (0.3 + (i * n + j) as f64).sin());
+            let v = vector::<Directions>(n, |i| (0.4 + i as f64).cos());
+            let of_row = |i: usize| (1..n).fold(a[(i, 0)] * v[0], |sum, k| sum + a[(i, k)] * v[k]);
+            let product = a.times(&v);
+            (0..n).all(|i| product[i].to_bits() == of_row(i).to_bits())
+        };
+        assert!(in_order(8) && !in_order(32));
+    }
+
+    #[test]
+    fn an_inverse_of_many_numbers_undoes_its_matrix_with_any_pivots() {
+        for n in [3, 9, 14] {
+            // The largest numbers stand beside the diagonal, so that rows change their places.
+            let few = matrix(n, 0.7);
+            let a: Matrix<AtRunTime> =
+                Matrix::of(n, |i, j| few[(i, j)] * 0.1 + if j == (i + 3) % n { 2.0 } else { 0.0 });
+            let one = a.inverse().expect("it is regular").product(&a);
+            for i in 0..n {
+                for j in 0..n {
+                    let wanted = if i == j { 1.0 } else { 0.0 };
+                    assert!((one[(i, j)] - wanted).abs() < 1e-14, "{n}, {i}, {j}: {one:?}");
+                }
+            }
+            assert!(matrix(n, 0.7).inverse().is_none(), "a row is zero");
+        }
     }
 }

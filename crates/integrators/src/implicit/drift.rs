@@ -4,7 +4,7 @@
 use metriplectic_equations::{Part, Path};
 
 use super::algebra::{add, dot};
-use super::parts::Parts;
+use super::parts::{PartJet, Parts};
 use super::start::Start;
 use crate::numbers::{Lengths, List};
 use crate::round_off::bound::ROUNDED;
@@ -48,9 +48,10 @@ pub(super) fn target<L: Lengths>(start: &Start<'_, L>, d: &L::Vector) -> Laws<L:
     let flat = metric.units().flat(d);
     let sizes_of_flat = parts.vector(|i| flat[i].abs());
     let mut sensitivity = pi.map_or_else(|| parts.zeros(), |pi| pi.tensor.abs());
-    if let Some(k) = &k {
-        sensitivity.add(1.0, &k.along_w.abs());
-    }
+    let by_friction = k.map(|PartJet { along_w, tensor, .. }| {
+        sensitivity.add(1.0, &along_w.abs());
+        tensor.abs_times(&sizes_of_flat)
+    });
     if let Some(Some(force)) = linearised(Part::Gyroscopic, parts.is_forced, &w.energy) {
         sensitivity.add(1.0, &force.tensor.abs());
     }
@@ -63,7 +64,7 @@ pub(super) fn target<L: Lengths>(start: &Start<'_, L>, d: &L::Vector) -> Laws<L:
         if far(e, law) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
     let of_energy = moved(&w.energy, &sensitivity.times(&sizes_of_flat));
-    let by_friction = k.map_or_else(|| parts.zero(), |k| k.tensor.abs_times(&sizes_of_flat));
+    let by_friction = by_friction.unwrap_or_else(|| parts.zero());
     let of_entropy = 1.0 + moved(&w.entropy, &by_friction);
     let mut drift = nothing::<L>(values);
     drift.energy = fraction(*energy, values.energy.abs(), &w.energy, of_energy);

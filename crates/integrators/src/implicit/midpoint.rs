@@ -12,6 +12,6 @@ mod step;
 
 pub(crate) use equation::FromEnd;
 pub(crate) use memory::MidpointNumbers;
-pub(crate) use root::from_end;
+pub(crate) use root::{along_parameters, from_end};
 pub(crate) use step::Midpoint;
 pub(super) use step::Solution;

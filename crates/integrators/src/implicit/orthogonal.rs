@@ -190,7 +190,7 @@ fn square_in<L: Lengths>(
 
 /// `v − along (functional·v)/square`, where the quotient has derivatives too.
 fn without<L: Lengths>(
-    v: &WithJacobian<L>,
+    v: WithJacobian<L>,
     along: &WithJacobian<L>,
     functional: &WithJacobian<L>,
     square: &Number<L>,
@@ -201,11 +201,11 @@ fn without<L: Lengths>(
         (functional.slope.transpose_times(&v.value), v.slope.transpose_times(&functional.value));
     let n = first.numbers().len();
     let dc: L::Vector = vector(n, |i| (first[i] + second[i] - square.slope[i] * c) * reciprocal);
-    let (mut value, mut slope) = (v.value.clone(), v.slope.clone());
+    let WithJacobian { mut value, mut slope, .. } = v;
     add(&mut value, -c, &along.value);
     slope.add(-c, &along.slope);
     slope.add_outer(-1.0, &along.value, &dc);
-    WithJacobian { value, slope }
+    WithJacobian::new(value, slope)
 }
 
 impl<L: Lengths> OrthogonalJet<L> {
@@ -255,7 +255,7 @@ impl<L: Lengths> OrthogonalJet<L> {
 
     /// Adds a covector, in the canonical metric.
     pub(crate) fn push(&mut self, w: &WithJacobian<L>) {
-        let n = self.covector(0, &self.covector(0, w));
+        let n = self.twice(w);
         let most = w.value.numbers().len();
         if magnitude(&n.value) > INDEPENDENT * magnitude(&w.value) && self.0.len() < most {
             let of_n = square(&n);
@@ -267,7 +267,7 @@ impl<L: Lengths> OrthogonalJet<L> {
     /// Adds a covector, in a metric; without one it is the canonical.
     pub(super) fn push_in(&mut self, g: Option<&MetricAlong<'_, L>>, w: &WithJacobian<L>) {
         let Some(g) = g else { return self.push(w) };
-        let n = self.covector(0, &self.covector(0, w));
+        let n = self.twice(w);
         let [hat, whole] = [&n, w].map(|w| g.factored.orthonormal(&w.value));
         let most = w.value.numbers().len();
         if magnitude(&hat) > INDEPENDENT * magnitude(&whole) && self.0.len() < most {
@@ -282,37 +282,42 @@ impl<L: Lengths> OrthogonalJet<L> {
             } else {
                 square_in(g, w, &g.factored.with_components(&whole))
             };
-            let sharp = Some(WithJacobian { value, slope });
+            let sharp = Some(WithJacobian::new(value, slope));
             self.0.push(NormalJet { n, sharp, square: of_n, size });
         }
     }
 
+    /// Projects a covector. The second pass removes the rounding error of the first.
+    fn twice(&self, w: &WithJacobian<L>) -> WithJacobian<L> {
+        if self.0.is_empty() { w.clone() } else { self.covector(0, self.covector(0, w.clone())) }
+    }
+
     /// Projects a vector off the covectors from the `first` on.
-    pub(crate) fn vector(&self, first: usize, v: &WithJacobian<L>) -> WithJacobian<L> {
+    pub(crate) fn vector(&self, first: usize, v: WithJacobian<L>) -> WithJacobian<L> {
         let normals = self.0[first..].iter();
-        normals.fold(v.clone(), |v, normal| without(&v, normal.sharp(), &normal.n, &normal.square))
+        normals.fold(v, |v, normal| without(v, normal.sharp(), &normal.n, &normal.square))
     }
 
     /// Projects a covector.
-    pub(crate) fn covector(&self, first: usize, w: &WithJacobian<L>) -> WithJacobian<L> {
+    pub(crate) fn covector(&self, first: usize, w: WithJacobian<L>) -> WithJacobian<L> {
         let normals = self.0[first..].iter();
-        normals.fold(w.clone(), |w, normal| without(&w, &normal.n, normal.sharp(), &normal.square))
+        normals.fold(w, |w, normal| without(w, &normal.n, normal.sharp(), &normal.square))
     }
 
     /// [`vector`](Self::vector) or [`covector`](Self::covector) with projections that fade out below the fraction `mu`.
     pub(super) fn faded(
         &self,
         first: usize,
-        (v, of): (&WithJacobian<L>, Of),
+        (v, of): (WithJacobian<L>, Of),
         mu: f64,
     ) -> WithJacobian<L> {
         let normals = self.0[first..].iter();
-        normals.fold(v.clone(), |v, normal| {
+        normals.fold(v, |v, normal| {
             let [along, functional] = match of {
                 Of::Vector => [normal.sharp(), &normal.n],
                 Of::Covector => [&normal.n, normal.sharp()],
             };
-            without(&v, along, functional, &normal.faded(mu))
+            without(v, along, functional, &normal.faded(mu))
         })
     }
 
@@ -327,13 +332,13 @@ impl<L: Lengths> OrthogonalJet<L> {
         let len = self.0.len();
         self.push_in(g, w);
         match self.0.get(len) {
-            Some(normal) => without(&v, normal.sharp(), w, &normal.faded(mu)),
+            Some(normal) => without(v, normal.sharp(), w, &normal.faded(mu)),
             None => v,
         }
     }
 }
 
 /// The sum of a matrix times a multiple of the identity, `c A`.
-pub(super) fn scaled<L: Lengths>(a: &Matrix<L>, c: f64) -> Matrix<L> {
+pub(super) fn scaled<L: Lengths>(a: Matrix<L>, c: f64) -> Matrix<L> {
     a.map(|a| a * c)
 }

@@ -2,6 +2,8 @@
 //!
 //! On a vector space with the canonical metric nothing of the space is asked for: charts are translations, and paths straight lines.
 
+use std::ops::Range;
+
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_equations::room::with_numbers;
@@ -12,7 +14,7 @@ use metriplectic_equations::{
 
 use smallvec::{SmallVec, smallvec};
 
-use super::algebra::{Matrix, sum_of_terms, vector};
+use super::algebra::{Matrix, dot, sum_of_terms, vector};
 use super::metric::Metric;
 use crate::numbers::{Lengths, List};
 use crate::step::Laws;
@@ -62,12 +64,39 @@ impl<V> OfLaws<Option<V>> {
 pub(crate) struct WithJacobian<L: Lengths> {
     pub(crate) value: L::Vector,
     pub(crate) slope: Matrix<L>,
+    /// The summands of the derivatives, if they are known apart.
+    pub(super) apart: Option<Box<Apart<L>>>,
+}
+
+/// A matrix `B + a bᵀ` by its summands, of which `B` may have few entries.
+#[derive(Debug)]
+pub(super) struct Apart<L: Lengths> {
+    pub(super) base: Matrix<L>,
+    pub(super) column: L::Vector,
+    pub(super) row: L::Vector,
+}
+
+impl<L: Lengths> WithJacobian<L> {
+    #[inline]
+    pub(crate) const fn new(value: L::Vector, slope: Matrix<L>) -> Self {
+        Self { value, slope, apart: None }
+    }
+
+    /// The derivatives `A ∂w` of a function with the derivatives `A`.
+    #[inline]
+    pub(super) fn before(&self, a: &Matrix<L>) -> Matrix<L> {
+        let Some(apart) = &self.apart else { return a.product(&self.slope) };
+        let Apart { base, column, row } = &**apart;
+        let mut product = a.product(base);
+        product.add_outer(1.0, &a.times(column), row);
+        product
+    }
 }
 
 impl<L: Lengths> Clone for WithJacobian<L> {
     #[inline]
     fn clone(&self) -> Self {
-        Self { value: self.value.clone(), slope: self.slope.clone() }
+        Self::new(self.value.clone(), self.slope.clone())
     }
 }
 
@@ -112,6 +141,8 @@ pub(crate) struct Parts<'a, L: Lengths> {
     entries: usize,
     /// The time of its force and of its energy.
     time: f64,
+    /// The parameter whose derivatives `∂F/∂θ_k` are taken in the place of the laws `F`.
+    parameter: Option<usize>,
     count: usize,
     /// Why each further invariant is conserved.
     pub(crate) kinds: Vec<Kind>,
@@ -142,6 +173,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
             has_metric,
             entries,
             time: NO_CLOCK,
+            parameter: None,
             count: directions,
             kinds: (0..further).map(|k| model.kind(k)).collect(),
             is_exact: model.second_law() == SecondLaw::Exact,
@@ -156,6 +188,11 @@ impl<'a, L: Lengths> Parts<'a, L> {
     /// The model at a time.
     pub(super) fn at(&self, time: f64) -> Self {
         Self { time, kinds: self.kinds.clone(), ..*self }
+    }
+
+    /// The model whose laws are the derivatives of the laws along a parameter. It knows their values and differentials alone.
+    pub(crate) fn along_parameter(&self, parameter: usize) -> Self {
+        Self { parameter: Some(parameter), kinds: self.kinds.clone(), ..*self }
     }
 
     /// The number of directions.
@@ -418,14 +455,20 @@ impl<'a, L: Lengths> Parts<'a, L> {
     /// A law at a state.
     #[inline]
     pub(super) fn value(&self, law: usize, x: &L::State) -> f64 {
+        if self.parameter.is_some() {
+            return self.jet(law, x).0;
+        }
         self.model.value(law, self.time, x.numbers())
     }
 
     /// A law with its differential.
     #[inline]
     pub(crate) fn jet(&self, law: usize, x: &L::State) -> (f64, L::Vector) {
-        let mut df = self.zero();
-        let value = self.model.jet(law, self.time, x.numbers(), df.numbers_mut());
+        let (mut df, x) = (self.zero(), x.numbers());
+        let value = match self.parameter {
+            None => self.model.jet(law, self.time, x, df.numbers_mut()),
+            Some(k) => self.model.law_along_parameter(law, k, self.time, x, df.numbers_mut()),
+        };
         (value, df)
     }
 
@@ -440,6 +483,9 @@ impl<'a, L: Lengths> Parts<'a, L> {
     /// The first and the second derivative of a law along a vector.
     #[inline]
     pub(super) fn along(&self, law: usize, x: &L::State, v: &L::Vector) -> [f64; 2] {
+        if self.parameter.is_some() {
+            return [dot(&self.jet(law, x).1, v), f64::NAN];
+        }
         let [_, first, _, second] = self.model.along(law, self.time, x.numbers(), [v.numbers(); 2]);
         [first, second]
     }
@@ -491,6 +537,24 @@ impl<'a, L: Lengths> Parts<'a, L> {
         let depends =
             self.model.friction_along_entropy(NO_CLOCK, z, w, alpha.numbers(), to).ok()?;
         Some(depends.then_some(slope))
+    }
+
+    /// The derivatives of the vector of a part along parameters, a column for each; `None` where it has no value.
+    pub(super) fn along_parameters(
+        &self,
+        part: Part,
+        z: &L::State,
+        [energy, entropy, alpha]: [&L::Vector; 3],
+        parameters: &Range<usize>,
+    ) -> Option<Matrix<L>> {
+        let (w, mut column, mut slope) =
+            (covectors::<L>(energy, entropy), self.zero(), self.zeros());
+        for (c, k) in parameters.clone().enumerate() {
+            let (z, alpha, to) = (z.numbers(), alpha.numbers(), column.numbers_mut());
+            self.model.part_along_parameter((part, k), self.time, z, w, alpha, to).ok()?;
+            (0..self.n()).for_each(|i| slope[(i, c)] = column[i]);
+        }
+        Some(slope)
     }
 
     /// The vector of a part with its derivatives; `None` where it has no value.

@@ -1,11 +1,13 @@
 //! The velocity `Π̃ w_H + K̃ w_S` of a model for given covectors, as in [`metriplectic_dynamics::velocity`], whose formulas they are,
 //! with its derivatives along the unknown of a step.
 
+use std::ops::Range;
+
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::velocity::{CASIMIR, MOMENTUM};
 use metriplectic_equations::Part;
 
-use super::algebra::{Matrix, add, dot};
+use super::algebra::{FEW, Matrix, add, dot, vector};
 use super::metric::{MetricAlong, Units};
 use super::orthogonal::{Of, Orthogonal, OrthogonalJet, scaled};
 use super::parts::{OfLaws, PartJet, Parts, WithJacobian};
@@ -151,6 +153,8 @@ struct OfPart<L: Lengths> {
     vector: WithJacobian<L>,
     /// Its derivative along the covector that it acts on.
     tensor: Matrix<L>,
+    /// Its derivative along the other covector that it depends on.
+    along_w: Matrix<L>,
     /// The absolute terms that it is summed of.
     terms: L::Vector,
 }
@@ -158,6 +162,9 @@ struct OfPart<L: Lengths> {
 /// `|A| |v|`.
 fn terms<L: Lengths>(a: &Matrix<L>, v: &L::Vector) -> L::Vector {
     let n = v.numbers().len();
+    if n > FEW {
+        return a.abs_times(&vector(n, |j| v[j].abs()));
+    }
     let mut sum = L::Vector::room(|| n);
     for i in 0..n {
         sum[i] = (0..n).fold(0.0, |sum, j| sum + a[(i, j)].abs() * v[j].abs());
@@ -185,7 +192,7 @@ impl<L: Lengths> Copy for Turn<'_, L> {}
 impl<L: Lengths> Turn<'_, L> {
     /// The derivatives `A ∂z` of a function with the derivatives `A`.
     #[inline]
-    pub(super) fn after(self, a: &Matrix<L>) -> Matrix<L> {
+    pub(super) fn after(self, a: Matrix<L>) -> Matrix<L> {
         match self {
             Self::Scaled(c) => scaled(a, c),
             Self::By(dz) => a.product(dz),
@@ -204,6 +211,8 @@ struct Linearisation<'a, L: Lengths> {
     w: &'a OfLaws<WithJacobian<L>>,
     /// Says whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
     is_whole: bool,
+    /// The parameters that the columns stand for, if they are no directions.
+    parameters: Range<usize>,
 }
 
 impl<L: Lengths> Linearisation<'_, L> {
@@ -213,30 +222,32 @@ impl<L: Lengths> Linearisation<'_, L> {
         part: Part,
         alpha: &WithJacobian<L>,
         other: &WithJacobian<L>,
-    ) -> Option<(PartJet<L>, OfPart<L>)> {
+    ) -> Option<OfPart<L>> {
         let OfLaws { energy, entropy, .. } = self.w;
         let w = [&energy.value, &entropy.value, &alpha.value];
-        let jet = self.parts.linearise(part, self.z, w)?;
-        let mut slope = self.dz.after(&jet.along_x);
-        slope.add(1.0, &jet.along_w.product(&other.slope));
-        slope.add(1.0, &jet.tensor.product(&alpha.slope));
+        let PartJet { value, along_x, along_w, tensor } = self.parts.linearise(part, self.z, w)?;
+        let mut slope = self.dz.after(along_x);
+        slope.add(1.0, &other.before(&along_w));
+        slope.add(1.0, &alpha.before(&tensor));
         if self.is_whole
             && part == Part::Irreversible
             && let Some(along_entropy) = self.parts.friction_along_entropy(self.z, w)?
         {
             slope.add(1.0, &along_entropy.product(&entropy.slope));
         }
-        let terms = terms(&jet.tensor, &alpha.value);
-        let vector = WithJacobian { value: jet.value.clone(), slope };
-        let tensor = jet.tensor.clone();
-        Some((jet, OfPart { vector, tensor, terms }))
+        if !self.parameters.is_empty() {
+            slope.add(1.0, &self.parts.along_parameters(part, self.z, w, &self.parameters)?);
+        }
+        let terms = terms(&tensor, &alpha.value);
+        let vector = WithJacobian::new(value, slope);
+        Some(OfPart { vector, tensor, along_w, terms })
     }
 
     /// A part that is zero.
     fn none(&self) -> OfPart<L> {
         let zeros = || self.parts.zeros();
-        let vector = WithJacobian { value: self.parts.zero(), slope: zeros() };
-        OfPart { vector, tensor: zeros(), terms: self.parts.zero() }
+        let vector = WithJacobian::new(self.parts.zero(), zeros());
+        OfPart { vector, tensor: zeros(), along_w: zeros(), terms: self.parts.zero() }
     }
 
     /// `Π w_H` without a projection, as it is written by hand.
@@ -245,7 +256,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         if !parts.moves {
             return Some(self.none());
         }
-        Some(self.part(Part::Reversible, &w.energy, &w.entropy)?.1)
+        self.part(Part::Reversible, &w.energy, &w.entropy)
     }
 
     fn reversible(&self) -> Option<OfPart<L>> {
@@ -253,8 +264,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         if !parts.moves {
             return Some(self.none());
         }
-        let bracket =
-            |alpha: &WithJacobian<L>| Some(self.part(Part::Reversible, alpha, &w.entropy)?.1);
+        let bracket = |alpha: &WithJacobian<L>| self.part(Part::Reversible, alpha, &w.entropy);
         let (is_projected, has_momenta) = (parts.is_projected(), parts.has(Kind::Momentum));
         if !is_projected && !has_momenta {
             return bracket(&w.energy);
@@ -265,7 +275,7 @@ impl<L: Lengths> Linearisation<'_, L> {
         }
         parts.of_kind(Kind::Casimir, w).for_each(|c| normals.push_in(metric, c));
         let mut pi = if is_projected {
-            bracket(&normals.faded(0, (&w.energy, Of::Covector), CASIMIR))?
+            bracket(&normals.faded(0, (w.energy.clone(), Of::Covector), CASIMIR))?
         } else {
             bracket(&w.energy)?
         };
@@ -278,7 +288,7 @@ impl<L: Lengths> Linearisation<'_, L> {
             add(&mut pi.terms, 1.0, &terms(&pi.tensor, &of_covector));
             let v = (&pi.vector.value, Of::Vector);
             normals.add_terms(0, v, CASIMIR, (&mut pi.terms, 1.0));
-            pi.vector = normals.faded(0, (&pi.vector, Of::Vector), CASIMIR);
+            pi.vector = normals.faded(0, (pi.vector, Of::Vector), CASIMIR);
         }
         if has_momenta {
             normals.push_in(metric, &w.energy);
@@ -287,14 +297,14 @@ impl<L: Lengths> Linearisation<'_, L> {
             let amplification = 1.0 + normals.amplification(first, MOMENTUM);
             let v = (&pi.vector.value, Of::Vector);
             normals.add_terms(first, v, MOMENTUM, (&mut pi.terms, amplification));
-            pi.vector = normals.faded(first, (&pi.vector, Of::Vector), MOMENTUM);
+            pi.vector = normals.faded(first, (pi.vector, Of::Vector), MOMENTUM);
         }
         Some(pi)
     }
 
     fn force(&self) -> Option<OfPart<L>> {
         let &Self { parts, w, metric, .. } = self;
-        let (_, mut force) = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
+        let mut force = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
         if parts.kinds.is_empty() {
             return Some(force);
         }
@@ -321,27 +331,51 @@ pub(super) fn velocity_jet<L: Lengths>(
     (z, dz, metric): (&L::State, Turn<'_, L>, Option<&MetricAlong<'_, L>>),
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz, metric, w, is_whole: false }.velocity()
+    Linearisation { parts, z, dz, metric, w, is_whole: false, parameters: 0..0 }.velocity()
 }
 
-/// Computes [`velocity_jet`] with all derivatives, on a vector space with the canonical metric, where that of the point is a multiple
-/// `dz` of the identity.
+/// The columns of whole derivatives on a vector space with the canonical metric.
+#[derive(Clone, Debug)]
+pub(crate) enum Columns {
+    /// The directions of an unknown, along which the point moves by this multiple of it.
+    Directions(f64),
+    /// These parameters, no more of them than directions. The point stays where it is.
+    Parameters(Range<usize>),
+}
+
+/// A linearisation with all derivatives, on a vector space with the canonical metric.
+fn whole<'a, L: Lengths>(
+    parts: &'a Parts<'_, L>,
+    z: &'a L::State,
+    columns: Columns,
+    w: &'a OfLaws<WithJacobian<L>>,
+) -> Linearisation<'a, L> {
+    let (dz, parameters) = match columns {
+        Columns::Directions(dz) => (dz, 0..0),
+        Columns::Parameters(parameters) => (0.0, parameters),
+    };
+    let dz = Turn::Scaled(dz);
+    Linearisation { parts, z, dz, metric: None, w, is_whole: true, parameters }
+}
+
+/// Computes [`velocity_jet`] with all derivatives, on a vector space with the canonical metric.
 pub(crate) fn whole_velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
-    dz: f64,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    Linearisation { parts, z, dz: Turn::Scaled(dz), metric: None, w, is_whole: true }.velocity()
+    whole(parts, z, columns, w).velocity()
 }
 
-/// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives along the state.
+/// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives.
 pub(super) fn written_velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    let at = Linearisation { parts, z, dz: Turn::Scaled(1.0), metric: None, w, is_whole: true };
+    let at = whole(parts, z, columns, w);
     at.with_reversible(at.written()?)
 }
 
@@ -349,11 +383,10 @@ pub(super) fn written_velocity_jet<L: Lengths>(
 pub(crate) fn reversible_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
-    dz: f64,
+    columns: Columns,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<WithJacobian<L>> {
-    let dz = Turn::Scaled(dz);
-    Some(Linearisation { parts, z, dz, metric: None, w, is_whole: true }.reversible()?.vector)
+    Some(whole(parts, z, columns, w).reversible()?.vector)
 }
 
 impl<L: Lengths> Linearisation<'_, L> {
@@ -370,19 +403,20 @@ impl<L: Lengths> Linearisation<'_, L> {
             normals.push_in(metric, &w.energy);
             first = normals.len();
             w.invariants.iter().for_each(|l| normals.push_in(metric, l));
-            alpha = Some(normals.covector(first, &w.entropy));
+            alpha = Some(normals.covector(first, w.entropy.clone()));
         }
         let alpha = alpha.as_ref().unwrap_or(&w.entropy);
-        let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
+        let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
+        let (mut sum, mut terms, mut sensitivity) = (pi.vector, pi.terms, pi.tensor);
         let mut irreversible = None;
         if parts.rubs {
-            let (jet, k) = self.part(Part::Irreversible, alpha, &w.energy)?;
+            let k = self.part(Part::Irreversible, alpha, &w.energy)?;
             let amplified = 1.0 + normals.amplification(first, MOMENTUM);
             add(&mut terms, 1.0, &k.terms);
             let v = (&k.vector.value, Of::Vector);
             normals.add_terms(first, v, MOMENTUM, (&mut terms, amplified));
-            sensitivity.add(1.0, &jet.along_w);
-            irreversible = Some(normals.vector(first, &k.vector));
+            sensitivity.add(1.0, &k.along_w);
+            irreversible = Some(normals.vector(first, k.vector));
         }
         if parts.is_forced {
             let force = self.force()?;
@@ -397,7 +431,6 @@ impl<L: Lengths> Linearisation<'_, L> {
                 None => force.vector,
             });
         }
-        let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
         let (mut production, mut friction) = (0.0, 0.0);
         if let Some(irreversible) = &irreversible {
             production = dot(&w.entropy.value, &irreversible.value);

@@ -16,13 +16,13 @@ use crate::step::{Dim, Effort, Flow as _, Laws, Start, StepError, Taken};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct StepFailure {
+pub(crate) struct StepFailure {
     /// The smallest residual that was found.
-    pub(super) residual: f64,
+    pub(crate) residual: f64,
     /// Why it was not taken.
-    pub(super) cause: Cause,
+    pub(crate) cause: Cause,
     /// The effort of the tries.
-    pub(super) effort: Effort,
+    pub(crate) effort: Effort,
 }
 
 /// The parts of a step that was not solved whole.
@@ -34,7 +34,7 @@ struct Halves<'a, R, W> {
 
 impl<R, W: DiscreteGradient> Scheme<R, W> {
     /// The step, whole or in parts.
-    pub(super) fn with_halves<Y>(
+    pub(crate) fn with_halves<Y>(
         &self,
         start: &Start<'_, Y>,
         memory: &mut MemoryOf<Y>,

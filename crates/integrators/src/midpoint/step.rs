@@ -1,6 +1,6 @@
 //! One implicit step: guess, solve, retract, and the last digits.
 
-use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw};
+use metriplectic_dynamics::{Invariants, Metriplectic};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Vector};
 use metriplectic_manifolds::{Manifold, Retraction};
 
@@ -15,71 +15,7 @@ use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
-use crate::step::{
-    Compiled, Dim, Effort, Evidence, Flow as _, GradientKind, Laws, PathOfStep, Promises, Refusal,
-    Start, StepError, StepStart, Stepper, Taken, name_of,
-};
-
-impl<Y, R, W> Stepper<Y> for Scheme<R, W>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-{
-    type Memory = MemoryOf<Y>;
-
-    const HAS_DEFAULT_BETWEEN: bool = true;
-
-    const IS_IMPLICIT: bool = R::PATH.is_some() && has_bits_of_types(W::KIND);
-
-    fn compiled(&self) -> Option<Compiled> {
-        let &Self { newton, splits, .. } = self;
-        let gradient = W::KIND.filter(|_| has_bits_of_types(W::KIND))?;
-        let line = PathOfStep { path: R::PATH?, gradient };
-        Some(Compiled::Midpoint { name: scheme_name::<R, W>, line, newton, splits })
-    }
-
-    fn name(&self) -> String {
-        scheme_name::<R, W>()
-    }
-
-    fn order(&self) -> u32 {
-        2
-    }
-
-    fn promises(&self, system: &Y) -> Promises {
-        Promises::all_laws(system.second_law() == SecondLaw::Exact)
-    }
-
-    fn step(
-        &self,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut MemoryOf<Y>,
-    ) -> Result<Taken<Y>, StepError> {
-        self.with_halves(&Start::of(start, h), memory)
-    }
-
-    fn attempt(
-        &self,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut MemoryOf<Y>,
-    ) -> Result<Taken<Y>, Refusal> {
-        let start = Start::of(start, h);
-        self.try_step(&start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
-            effort: failure.effort,
-            error: failure.cause.first_law(start.time, h),
-            second_law: false,
-        })
-    }
-}
-
-/// Returns whether steps in plain numbers have the bits of those in types, as the runs of tangents do. Newton's method for increments has
-/// derivatives by dual numbers there, and in closed form here.
-const fn has_bits_of_types(gradient: Option<GradientKind>) -> bool {
-    matches!(gradient, Some(GradientKind::Gonzalez | GradientKind::MeanValue))
-}
+use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, Taken, name_of};
 
 /// The name of a scheme in a checkpoint.
 pub(crate) fn scheme_name<R, W>() -> String {
@@ -122,7 +58,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 
     /// Guess, solve, retract; then the last digits.
-    pub(super) fn try_step<Y>(
+    pub(crate) fn try_step<Y>(
         &self,
         start: &Start<'_, Y>,
         memory: &mut MemoryOf<Y>,

@@ -100,9 +100,44 @@ impl Corners {
         Some(corner.max(time) + apart)
     }
 
+    /// Times before and behind the corners that are this time, to the accuracy of the time of an event.
+    pub(crate) fn around(&self, time: f64) -> Option<[f64; 2]> {
+        let (apart, near) = (self.apart(time), 8.0 * self.apart(time));
+        let corner = self.beyond(time - near).filter(|corner| *corner <= time + near)?;
+        let mut last = corner;
+        while let Some(next) = self.beyond(last).filter(|next| *next <= time + near) {
+            last = next;
+        }
+        Some([corner - apart, last + apart])
+    }
+
     /// The time at which a step ends that goes on to a corner.
     fn before(&self, corner: f64) -> f64 {
         corner - self.apart(corner)
+    }
+
+    /// Returns whether a corner lies in a step between two times, or no farther from it than it is long.
+    pub(crate) fn is_near(&self, [time, end]: [f64; 2]) -> bool {
+        let far = (end - time).abs() + self.apart(time).max(self.apart(end));
+        self.beyond(time - far).is_some_and(|corner| corner <= end + far)
+    }
+
+    /// The intervals of a step of one size from a time on.
+    pub(crate) fn intervals(&self, time: f64, step: Fixed) -> Vec<Interval> {
+        let mut intervals = vec![self.interval(time, step, true)];
+        while let Some(last) = intervals.last().filter(|last| last.recorded < step.end) {
+            intervals.push(self.interval(last.recorded, step, false));
+        }
+        intervals
+    }
+
+    /// The interval of a step of one size that begins at a time.
+    fn interval(&self, time: f64, Fixed { h, end }: Fixed, is_first: bool) -> Interval {
+        let Stop { stop, recorded, is_corner } = self.stop(time, end);
+        let behind = self.behind(time);
+        let is_whole = is_first && behind.is_none() && !is_corner;
+        let h = if is_whole { h } else { stop - behind.unwrap_or(time) };
+        Interval { behind, h, recorded, is_corner }
     }
 
     /// How far a step may go from a time on the way to an end.
@@ -143,6 +178,19 @@ pub(crate) struct Fixed {
     pub(crate) end: f64,
 }
 
+/// A step or a part of one, without a corner inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval {
+    /// The time to which the clock is set before it, if it begins at a corner.
+    pub(crate) behind: Option<f64>,
+    /// Its size.
+    pub(crate) h: f64,
+    /// The time that is recorded at its end.
+    pub(crate) recorded: f64,
+    /// Whether it ends before a corner.
+    pub(crate) is_corner: bool,
+}
+
 /// A step of one size in a run with these corners.
 #[inline]
 pub(super) fn step<F: Flow + ?Sized>(
@@ -159,7 +207,7 @@ pub(super) fn step<F: Flow + ?Sized>(
 fn cut<F: Flow + ?Sized>(
     method: &mut dyn AnyStepper<F>,
     start: StepStart<'_, F>,
-    Fixed { h, end }: Fixed,
+    size: Fixed,
     corners: &Corners,
 ) -> Result<Taken<F>, StepError> {
     let flow = start.flow;
@@ -167,13 +215,7 @@ fn cut<F: Flow + ?Sized>(
     let (mut x, mut values) = (start.x.clone(), start.values.clone());
     let mut before: Option<Taken<F>> = None;
     loop {
-        let Stop { stop, recorded, is_corner } = corners.stop(time, end);
-        let behind = corners.behind(time);
-        let size = if before.is_none() && behind.is_none() && !is_corner {
-            h
-        } else {
-            stop - behind.unwrap_or(time)
-        };
+        let Interval { behind, h, recorded, .. } = corners.interval(time, size, before.is_none());
         if let Some(behind) = behind {
             method.restart();
             if let Some(clocked) = flow.clocked(&x, behind) {
@@ -189,8 +231,8 @@ fn cut<F: Flow + ?Sized>(
             reference: reference.clone(),
             allowed: start.allowed.clone(),
         };
-        let mut taken = method.step(from, size)?;
-        taken.evidence.shortest_part = size;
+        let mut taken = method.step(from, h)?;
+        taken.evidence.shortest_part = h;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {
             taken.values = flow.laws(&clocked);
@@ -204,7 +246,7 @@ fn cut<F: Flow + ?Sized>(
             taken.effort += before.effort;
             taken.effort.splits += 1;
         }
-        if recorded >= end {
+        if recorded >= size.end {
             return Ok(taken);
         }
         (x, values, time) = (taken.x.clone(), taken.values.clone(), recorded);
@@ -231,6 +273,25 @@ mod tests {
         assert_eq!(found, [0.25, 0.3, 0.5, 0.75, 1.0]);
         let none = Corners::default();
         assert!(none.behind(0.5).is_none() && none.after(0.0).is_none());
+    }
+
+    #[test]
+    fn a_step_is_cut_in_intervals() {
+        let corners = Corners { times: vec![0.3, 0.35], interval: None, start: 0.0 };
+        let intervals = corners.intervals(0.25, Fixed { h: 0.25, end: 0.5 });
+        let recorded: Vec<f64> = intervals.iter().map(|interval| interval.recorded).collect();
+        assert_eq!(recorded, [0.3, 0.35, 0.5]);
+        let ends: Vec<_> = intervals.iter().map(|i| (i.behind.is_some(), i.is_corner)).collect();
+        assert_eq!(ends, [(false, true), (true, true), (true, false)]);
+        // Two times four roundings are left out at each corner.
+        let left = 0.25 - intervals.iter().map(|interval| interval.h).sum::<f64>();
+        assert!((0.0..2e-14).contains(&left), "{left:e}");
+        let whole = corners.intervals(0.5, Fixed { h: 0.25, end: 0.75 });
+        assert!(whole.len() == 1 && whole[0].h.to_bits() == 0.25_f64.to_bits());
+        assert!(corners.is_near([0.25, 0.28]) && corners.is_near([0.4, 0.5]));
+        assert!(!corners.is_near([0.5, 0.6]) && !corners.is_near([0.1, 0.15]));
+        let [before, behind] = corners.around(0.3 + 1e-15).expect("a corner");
+        assert!(before < 0.3 && behind > 0.3 && corners.around(0.3 + 1e-13).is_none());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The last step of a run, for what differentiates it.
 
 use crate::run::controller::StepSize;
+use crate::run::corners::{Corners, Fixed, Interval};
 use crate::run::steps::Steps;
 use crate::step::{EntropyStep, Flow, Laws, Memory as _, Saved, Scales, StepStart, Stepper};
 
@@ -13,6 +14,37 @@ pub(crate) struct LastStep<'a, F: Flow + ?Sized> {
     pub(crate) entropy_step: Option<EntropyStep>,
     pub(crate) stage_count: Option<u32>,
     pub(crate) stage_velocities: Vec<f64>,
+    corners: &'a Corners,
+    /// The time at its end.
+    end: f64,
+    is_of_one_size: bool,
+}
+
+impl<F: Flow + ?Sized> LastStep<'_, F> {
+    /// The intervals between corners of the step.
+    pub(crate) fn intervals(&self) -> Vec<Interval> {
+        self.intervals_up_to(self.h, self.end)
+    }
+
+    /// The intervals between corners of a step of this size up to a time.
+    pub(crate) fn intervals_up_to(&self, h: f64, end: f64) -> Vec<Interval> {
+        let (corners, time) = (self.corners, self.start.time);
+        if self.is_of_one_size && !corners.is_empty() {
+            return corners.intervals(time, Fixed { h, end });
+        }
+        let (behind, is_corner) = (corners.behind(time), corners.behind(end).is_some());
+        vec![Interval { behind, h, recorded: end, is_corner }]
+    }
+
+    /// Times before and behind the corner at a time; `None` if there is no corner.
+    pub(crate) fn around_corner(&self, time: f64) -> Option<[f64; 2]> {
+        self.corners.around(time)
+    }
+
+    /// Returns whether a corner lies in the step, or no farther from it than it is long.
+    pub(crate) fn is_near_corner(&self) -> bool {
+        self.corners.is_near([self.start.time, self.end])
+    }
 }
 
 impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
@@ -75,6 +107,9 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
             entropy_step: before.entropy_step,
             stage_count: None,
             stage_velocities: Vec::new(),
+            corners: &self.course.progress.corners,
+            end: time + before.h,
+            is_of_one_size: !self.is_adaptive(),
         })
     }
 
@@ -95,7 +130,17 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
         let entropy_step = before.entropy_step;
         let stage_count = self.memory.stage_count();
         let stage_velocities = self.memory.stage_velocities();
-        let (h, in_parts) = (before.h, before.in_parts);
-        LastStep { start, h, in_parts, entropy_step, stage_count, stage_velocities }
+        let (corners, end) = (&self.course.progress.corners, self.course.state.time);
+        LastStep {
+            start,
+            h: before.h,
+            in_parts: before.in_parts,
+            entropy_step,
+            stage_count,
+            stage_velocities,
+            corners,
+            end,
+            is_of_one_size: !self.is_adaptive(),
+        }
     }
 }

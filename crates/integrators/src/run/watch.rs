@@ -75,7 +75,7 @@ pub trait Watch: Into<Schedule> {
     /// Names times at which the law of motion of an open system jumps or has a kink. No step goes across them: each ends at
     /// a corner on the old law, and the next one begins there with the new law. What the energy changes by at the corner
     /// is work of the time at a frozen state. Times that differ by a few roundings are one corner. Corners outside of the run
-    /// are left out.
+    /// are left out. [Tangents](crate::Tangents) and [adjoints](crate::Adjoints) cross corners.
     ///
     /// ```
     /// use metriplectic_dynamics::{Symplectic, System};

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 
 use super::differentiated::Differentiated;
 use super::error::TangentError;
-use super::part::Part;
+use super::product::{Product, pull_back};
 use super::smooth::{FlowOf, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::in_wide_room;
 use super::tape::{Segment, Tape, TapedStep};
@@ -74,7 +74,7 @@ pub trait Adjoints: Sized {
     ///
     /// # Errors
     ///
-    /// [`TangentError`]; [`TangentError::Broken`] if the schedule has corners or jumps without
+    /// [`TangentError`]; [`TangentError::Broken`] if the schedule has jumps without
     /// [derivatives](crate::Jumping::differentiable), and [`TangentError::Grazing`] at an event whose time has none.
     fn adjoint<D>(
         self,
@@ -285,18 +285,15 @@ where
         (row, along_end): (&impl Fn(usize) -> DVector<f64>, f64),
     ) -> Result<DVector<f64>, TangentError<SpaceOf<D>>> {
         let time = step.time;
-        let through = |parts: &[Part<FlowOf<D>>], mut costate: DVector<f64>| {
-            for part in parts.iter().rev() {
-                let pulled = self.system.pull_back(&self.method, part, &costate);
-                costate = pulled.map_err(|cause| TangentError::NotLinearised { time, cause })?;
-            }
-            Ok::<_, TangentError<SpaceOf<D>>>(costate)
+        let through = |product: &Product<FlowOf<D>>, costate: DVector<f64>| {
+            let pulled = pull_back((self.system, &self.method), product, costate);
+            pulled.map_err(|cause| TangentError::NotLinearised { time, cause })
         };
         let [inside, at_end] = self.tape.recorded(step);
         let costate = at_end.fold(costate, |sum, k| sum + row(k));
-        let mut before = through(&step.parts, step.end.pull_back(costate, along_end)?)?;
-        for (k, parts) in inside.zip(&step.outputs) {
-            before += through(parts, row(k))?;
+        let mut before = through(&step.product, step.end.pull_back(costate, along_end)?)?;
+        for (k, output) in inside.zip(&step.outputs) {
+            before += through(output, row(k))?;
         }
         Ok(before)
     }

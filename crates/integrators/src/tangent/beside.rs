@@ -49,6 +49,11 @@ pub(super) fn rounding() -> f64 {
     16.0 * f64::EPSILON / STEP
 }
 
+/// The displacement of a parameter with this value.
+pub(super) fn displacement(value: f64) -> f64 {
+    STEP * value.abs()
+}
+
 /// The parameters of a system, and the systems beside it.
 pub(super) trait Parameters<F> {
     /// Returns the values of the parameters.
@@ -60,6 +65,15 @@ pub(super) trait Parameters<F> {
     ///
     /// [`Unlinearised::NoSystem`] if the closure of the system refuses them.
     fn displaced(&self, by: &[f64]) -> Result<F, Unlinearised>;
+
+    /// Computes the differentials of the laws in all directions, if those along the parameters are known.
+    fn known_rows(&self, x: &Element<F>) -> Option<LawRows<DVector<f64>>>
+    where
+        F: Flow,
+    {
+        let _ = x;
+        None
+    }
 }
 
 /// The parameters of a system without parameters.
@@ -257,10 +271,10 @@ impl<F: SmoothFlow, M: Stepper<F>> Beside<'_, F, M> {
         let by = STEP * again.whole;
         let end = |h: f64| self.off_end(&self.end(flow, x, (*time, h), |_| {})?);
         let slope = || Ok::<_, Unlinearised>((end(h + by)? - end(h - by)?) / (2.0 * by));
-        let known = if h.abs() > 2.0 * by.abs() {
+        let known = if h.abs() > 2.0 * by.abs() && !again.is_still {
             slope().ok()
         } else {
-            // So short a step is one along the velocity.
+            // So short a step is one along the velocity, and one of another size may end beyond a corner.
             let still = flow.sizes(&step.end).zero();
             flow.rates(&step.end, &still).map(|rates| list::<F>(&rates))
         };
@@ -273,7 +287,7 @@ impl<F: SmoothFlow, M: Stepper<F>> Beside<'_, F, M> {
     }
 }
 
-/// Computes the differentials of the laws along the state and, by differences, along the parameters.
+/// Computes the differentials of the laws along the state and along the parameters, by differences where these are not known.
 ///
 /// # Errors
 ///
@@ -283,6 +297,9 @@ pub(super) fn law_rows<F: SmoothFlow>(
     parameters: &dyn Parameters<F>,
     x: &Element<F>,
 ) -> Result<LawRows<DVector<f64>>, Unlinearised> {
+    if let Some(rows) = parameters.known_rows(x) {
+        return Ok(rows);
+    }
     let (n, values) = (flow.directions(), parameters.values());
     let rows = flow.law_rows(x);
     let mut rows = rows.map(|row| row.clone().resize_vertically(n + values.len(), 0.0));
@@ -294,7 +311,7 @@ pub(super) fn law_rows<F: SmoothFlow>(
             Ok(DVector::from_iterator(2 + invariants.as_ref().len(), laws))
         };
         let slope = |e: f64| Ok((laws(e)? - laws(-e)?) / (2.0 * e));
-        let e = STEP * value.abs();
+        let e = displacement(*value);
         let slope = (slope(e)? * 4.0 - slope(2.0 * e)?) / 3.0;
         rows.set(n + k, slope[0], slope[1]);
         rows.invariants.iter_mut().zip(&slope.as_slice()[2..]).for_each(|(row, s)| row[n + k] = *s);
@@ -320,6 +337,7 @@ pub(crate) fn propagate<F: SmoothFlow, M: Stepper<F>>(
     let carried = carried.clone();
     let (rows, here) = (&carried.laws, law_rows(flow, parameters, &step.x)?);
     let mut t = DMatrix::zeros(carried.t.nrows(), carried.t.ncols());
+    let still = flow.clock().filter(|_| again.is_still);
     for j in 0..t.ncols() {
         // By as much as the derivative of each law has drifted on the way.
         let laws = |e: f64, laws: &mut Laws<F::Numbers>| {
@@ -328,7 +346,10 @@ pub(crate) fn propagate<F: SmoothFlow, M: Stepper<F>>(
                 laws.invariants[k] += e * (row[j] - df.dot(&carried.t.column(j)));
             }
         };
-        let column = carried.t.column(j).into_owned();
+        let mut column = carried.t.column(j).into_owned();
+        if let Some(clock) = still {
+            column[clock] = 0.0;
+        }
         t.set_column(j, &beside.column(&column, laws, &sizes)?);
     }
     Ok(Moved { carried: Carried { t, ..carried }, along_h: beside.along_h() })

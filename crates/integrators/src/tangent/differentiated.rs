@@ -1,6 +1,6 @@
 //! The systems whose runs by a method have derivatives.
 
-use metriplectic_dynamics::{Differentiable, Metriplectic, VectorField as _};
+use metriplectic_dynamics::{Differentiable, Metriplectic, ModelError, VectorField as _};
 use metriplectic_fields::{
     ChartPoint, Column as _, Dimension as _, Matrix, Real, Space, Square as _, Vector,
 };
@@ -15,7 +15,7 @@ use super::linearised::{Linearised, Propagated};
 use super::part::{Part, Wide};
 use super::smooth::{FlowOf, SmoothFlow, matrix, numbers};
 use crate::noise::{Fluctuating, Noisy};
-use crate::step::{Compiled, Dim, Element, Flow as _, HasFlow, Stepper, Vector as _};
+use crate::step::{Compiled, Dim, Element, Flow, HasFlow, Stepper, Vector as _};
 
 /// A system whose runs by the method `M` have derivatives along their start and along parameters.
 ///
@@ -23,7 +23,7 @@ use crate::step::{Compiled, Dim, Element, Flow as _, HasFlow, Stepper, Vector as
 /// of all directions.
 ///
 /// The derivatives of a step are exact for systems in types and, as far as its own derivatives are, for a
-/// [model](metriplectic_equations::Model) on a vector space. For any other kind of system they are formed by differences of steps beside
+/// [model](metriplectic_equations::Model) on a vector space, along its start and along the parameters that it knows. For any other kind of system they are formed by differences of steps beside
 /// it, as in the defaults here: with the same size, the same random numbers and the same branch of the method, to some ten digits.
 ///
 /// Laws: those of [`Linearised`].
@@ -57,6 +57,16 @@ pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow<Flow: Smo
     /// Computes the differentials of the laws at a state, in all directions.
     fn wide_rows(&self, x: &Element<FlowOf<Self>>) -> LawRows<DVector<f64>> {
         self.as_flow().law_rows(x)
+    }
+
+    /// Compares what the system knows of its derivatives along parameters with its values, at the start of a run.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] with the derivative that is not that of the values.
+    fn check_parameters(&self, x: &Element<FlowOf<Self>>) -> Result<(), ModelError> {
+        let _ = x;
+        Ok(())
     }
 
     /// Computes the size of each direction.
@@ -95,6 +105,22 @@ pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow<Flow: Smo
         costate: &DVector<f64>,
     ) -> Result<DVector<f64>, Unlinearised> {
         beside::pull_back((self.as_flow(), method, &NoParameters), step, costate)
+    }
+
+    /// Refuses a corner, at which the clock of a state is set, if its time depends on a parameter: a velocity beside the system has the law
+    /// of the other side. The sizes are those of the entries in the run, and steps have the size `h` there.
+    ///
+    /// # Errors
+    ///
+    /// [`Unlinearised::MovingCorner`].
+    fn check_corner(
+        &self,
+        sides: [&Element<FlowOf<Self>>; 2],
+        sizes: Option<&<FlowOf<Self> as Flow>::Vector>,
+        h: f64,
+    ) -> Result<(), Unlinearised> {
+        let _ = (sides, sizes, h);
+        Ok(())
     }
 
     /// Computes the error of the second law of tangents in a step, for a column at its start and at its end; `None` if it is not known.

@@ -44,8 +44,8 @@ pub enum Unlinearised {
     NoSize,
     /// A parameter is zero, and derivatives along it are differences.
     #[error(
-        "the parameter {name} is zero, so that a difference along it has no size; take another value, or a `Family`, whose derivatives \
-         are exact"
+        "the parameter {name} is zero, so that a difference along it has no size; take another value, or a `Family` or a model that \
+         knows its parameters, whose derivatives are exact"
     )]
     ZeroParameter {
         /// The parameter.
@@ -54,6 +54,15 @@ pub enum Unlinearised {
     /// A system at parameters beside those of the run is refused.
     #[error("there is no system at parameters beside these; take values inside their bounds")]
     NoSystem,
+    /// The time of a corner depends on a parameter.
+    #[error(
+        "the law changes at a time that depends on the parameter {name}, and the corner that is named stays where it is; take differences \
+         of whole runs, each of which names its own corner"
+    )]
+    MovingCorner {
+        /// The parameter.
+        name: &'static str,
+    },
     /// A step bends over less than differences can resolve.
     #[error(
         "differences of steps beside the step do not agree, as where a function is not smooth; take smaller steps, or another start"
@@ -111,13 +120,13 @@ pub enum TangentError<M: StateSpace> {
         /// The difference of the last two runs.
         reached: f64,
     },
-    /// The state jumps at an event without derivatives, or steps end at corners.
+    /// The state jumps at an event without derivatives, or the run goes back in time.
     #[error(
         "the schedule has {what}, across which the tangent is not carried; give a jump or a stop its derivatives at points of the system \
          with its parameters (`Jumping::differentiable`, `Watched::differentiable`), or run up to the first one and go on from there"
     )]
     Broken {
-        /// The jumps, the stop or the corners.
+        /// The jumps, the stop or the run.
         what: &'static str,
     },
     /// The derivatives of a jump are those of another map than the one by which the state has jumped.
@@ -145,6 +154,17 @@ pub enum TangentError<M: StateSpace> {
         time: f64,
         /// `|g|/|dg|`, with the entries in units of their sizes.
         off: f64,
+    },
+    /// An event lies at a corner of the law, and leaves it when the start or a parameter moves.
+    #[error(
+        "the event {event} at t = {time} lies at a corner, where the velocity is another one on either side, so its time has no derivative; \
+         choose another start, or move the corner or the event"
+    )]
+    EventAtCorner {
+        /// The name of the event.
+        event: String,
+        /// Its time.
+        time: f64,
     },
     /// An event is grazing: its function hardly changes along the motion, so that its time has no derivative.
     #[error(

@@ -7,7 +7,9 @@ use metriplectic_fields::{Column as _, ScalarField, Vector};
 use nalgebra::{DMatrix, DVector};
 
 use super::error::TangentError;
+use super::explicit::NEAR;
 use super::state::TangentState;
+use crate::round_off::bound::SUMMED;
 use crate::run::event::Event;
 use crate::step::Flow;
 
@@ -19,8 +21,11 @@ pub struct TangentEvent<F: Flow> {
     pub state: TangentState<F>,
     /// The velocity of the state along the size of the last step. It is that of the discrete map.
     pub velocity: DVector<f64>,
-    /// The largest size that each entry has had in the run, or soon has from its start; zero for one that stays zero.
+    /// The largest size that each entry has had in the run, or soon has from its start; zero for one that stays zero, for the clock and for
+    /// the ledger.
     pub sizes: DVector<f64>,
+    /// The velocity behind a corner at this time, less that before it.
+    pub(super) across: Option<DVector<f64>>,
     /// The state after its [jump](crate::Watched::jump), with its derivatives at the same fixed time.
     pub after: Option<TangentState<F>>,
 }
@@ -49,13 +54,16 @@ impl<F: Flow> TangentEvent<F> {
     ///
     /// # Errors
     ///
-    /// [`TangentError::Grazing`] if `|dg·v| ≤ 10⁻⁶ |dg||v|`, with the entries in units of their [`sizes`](Self::sizes).
+    /// [`TangentError::Grazing`] if `|dg·v| ≤ 10⁻⁶ |dg||v|`, with the entries in units of their [`sizes`](Self::sizes), and
+    /// [`TangentError::EventAtCorner`] at a [corner](crate::Watch::corners) across which the velocity changes.
     pub fn time_by(&self, dg: &DVector<f64>) -> Result<DVector<f64>, TangentError<F::Space>> {
         // The function does not depend on a ledger.
         let dg = &dg.clone().resize_vertically(self.velocity.len(), 0.0);
         let rate = dg.dot(&self.velocity);
         self.located().crosses(rate, dg)?;
-        Ok(self.state.derivative_of(dg) * -rate.recip())
+        let along = self.state.derivative_of(dg) * -rate.recip();
+        self.located().has_velocity(&along, |_| 0.0)?;
+        Ok(along)
     }
 
     /// The derivative of the state at the event along start and parameters, `T + v δt*`, with a row for each direction of
@@ -70,7 +78,8 @@ impl<F: Flow> TangentEvent<F> {
 
     /// The event without its derivatives.
     pub(super) const fn located(&self) -> Located<'_, F> {
-        Located { event: &self.event, velocity: &self.velocity, sizes: &self.sizes }
+        let Self { event, velocity, sizes, across, .. } = self;
+        Located { event, velocity, sizes, across: across.as_ref() }
     }
 }
 
@@ -79,6 +88,8 @@ pub(super) struct Located<'a, F: Flow> {
     pub(super) event: &'a Event<F::Space>,
     pub(super) velocity: &'a DVector<f64>,
     pub(super) sizes: &'a DVector<f64>,
+    /// The velocity behind a corner at this time, less that before it.
+    pub(super) across: Option<&'a DVector<f64>>,
 }
 
 impl<F: Flow> Located<'_, F> {
@@ -97,16 +108,41 @@ impl<F: Flow> Located<'_, F> {
         Ok(())
     }
 
+    /// Refuses an event at a corner across which the velocity changes, if the event leaves it: where its time changes by `along` in a
+    /// direction in which the clock of the state is `late`.
+    pub(super) fn has_velocity(
+        &self,
+        along: &DVector<f64>,
+        late: impl Fn(usize) -> f64,
+    ) -> Result<(), TangentError<F::Space>> {
+        let leaves = |k: usize| (along[k] + late(k)).abs() > SUMMED * along[k].abs();
+        let v = self.velocity;
+        let changes = |across: &&DVector<f64>| {
+            let mut unsized_rates = (0..v.len()).filter(|&i| self.sizes[i] == 0.0);
+            self.speed(across) > NEAR * self.speed(v)
+                || unsized_rates.any(|i| across[i].abs() > NEAR * v[i].abs())
+        };
+        if self.across.filter(changes).is_some() && (0..along.len()).any(leaves) {
+            let (event, time) = (self.event.name.to_string(), self.event.state.time);
+            return Err(TangentError::EventAtCorner { event, time });
+        }
+        Ok(())
+    }
+
     /// The lengths of a differential and of the velocity, in units of the sizes of the entries.
-    ///
-    /// An entry without a size does not move.
     pub(super) fn lengths(&self, dg: &DVector<f64>) -> (f64, f64) {
-        let entries = (0..self.sizes.len()).filter(|&i| self.sizes[i] > 0.0);
-        let (dg, speed) = entries.fold((0.0, 0.0), |(sum, speed), i| {
-            let size = self.sizes[i];
-            (sum + (dg[i] * size).powi(2), speed + (self.velocity[i] / size).powi(2))
-        });
-        (dg.sqrt(), speed.sqrt())
+        let squares = self.sized().map(|i| (dg[i] * self.sizes[i]).powi(2));
+        (squares.sum::<f64>().sqrt(), self.speed(self.velocity))
+    }
+
+    /// The length of a velocity, in units of the sizes of the entries.
+    fn speed(&self, v: &DVector<f64>) -> f64 {
+        self.sized().map(|i| (v[i] / self.sizes[i]).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// The entries with a size: one without does not move.
+    fn sized(&self) -> impl Iterator<Item = usize> {
+        (0..self.sizes.len()).filter(|&i| self.sizes[i] > 0.0)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The derivative of one step of a model in plain numbers, on a vector space.
+//! The derivative of one step of a model in plain numbers, on a vector space, along its start and the parameters that it knows.
 
 pub(super) mod collocated;
 mod explicit;
@@ -26,6 +26,8 @@ pub(super) struct StepOfModel<'a, S: ?Sized = dyn Model + 'a> {
     pub(super) end: &'a [f64],
     /// Its size.
     pub(super) h: f64,
+    /// How many parameters the model is differentiated along.
+    pub(super) parameters: usize,
     /// The error that each entry was allowed, if the steps follow a tolerance.
     pub(super) allowed: Option<&'a [f64]>,
     /// The values of the laws that an explicit method moves its end onto, with the entropy at its start.
@@ -46,6 +48,11 @@ pub(super) type StepOfSystem<'a> = StepOfModel<'a, dyn Equations + 'a>;
 pub(super) struct Derivative {
     /// `∂x'/∂x`, `n × n`.
     pub(super) along_x: DMatrix<f64>,
+    /// `∂x'/∂θ`, a column for each parameter.
+    pub(super) along_parameters: DMatrix<f64>,
     /// `∂x'/∂h`.
     pub(super) along_h: DVector<f64>,
 }
+
+/// The derivatives of a loss along the start of a step, and along the parameters.
+pub(super) type Pulled = (DVector<f64>, DVector<f64>);

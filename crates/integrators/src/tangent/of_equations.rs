@@ -1,6 +1,7 @@
 //! The derivatives of runs of systems in plain numbers.
 
-use metriplectic_equations::{ENERGY, ENTROPY, Equations, Model, Sizes};
+use metriplectic_equations::judge::Judge;
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Model, ModelError, Sizes};
 use metriplectic_fields::Real;
 use nalgebra::{DMatrix, DVector};
 
@@ -8,6 +9,7 @@ use super::beside::{self, NoParameters};
 use super::columns::{Carried, LawRows, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
+use super::exact::ExactSteps;
 use super::numbers::{
     Derivative, StepOfModel, collocated, explicit_propagate, is_self_adjoint, schemes,
 };
@@ -16,7 +18,7 @@ use super::smooth::SmoothFlow;
 use crate::collocation::Tableau;
 use crate::compiled::explicit;
 use crate::explicit::ExplicitRungeKutta;
-use crate::implicit::{Collocation, is_flat};
+use crate::implicit::{Collocation, is_flat, law_along_parameters};
 use crate::numbers::FromEquations;
 use crate::step::{
     Compiled, Directions, Entries, Flow as _, Laws, PathOfStep, Stepper, Vector as _,
@@ -34,13 +36,14 @@ fn targets<S: Equations>(step: &Part<FromEquations<S>>) -> Laws<Vec<f64>> {
 fn in_numbers<'a, S: Equations, Y: ?Sized>(
     model: &'a Y,
     step: &'a Part<FromEquations<S>>,
-    targets: &'a Laws<Vec<f64>>,
+    (targets, parameters): (&'a Laws<Vec<f64>>, usize),
 ) -> StepOfModel<'a, Y> {
     StepOfModel {
         model,
         x: &step.x,
         end: &step.end,
         h: step.h,
+        parameters,
         allowed: step.allowed.as_ref().map(|allowed| allowed.numbers()),
         targets,
         entropy_step: step.entropy_step,
@@ -126,6 +129,10 @@ impl<S: Equations> SmoothFlow for FromEquations<S> {
         let slopes = at(step).into_iter().zip(at(-step)).map(|(a, b)| (a - b) / (2.0 * step));
         at(0.0).into_iter().zip(slopes).map(|(q, slope)| [q, slope]).collect()
     }
+
+    fn exact_steps(&self) -> Option<&dyn ExactSteps<Self>> {
+        Some(self)
+    }
 }
 
 impl<S: Equations> FromEquations<S> {
@@ -189,6 +196,115 @@ impl<S: Equations> FromEquations<S> {
     }
 }
 
+impl<S: Equations> ExactSteps<Self> for FromEquations<S> {
+    fn has_steps(&self, method: Option<Compiled>) -> bool {
+        self.exactly(method).is_some()
+    }
+
+    fn known_parameters(&self) -> usize {
+        let known = self.0.model().filter(|model| !model.has_derivatives_by_differences());
+        known.map_or(0, Model::parameters)
+    }
+
+    fn rows(&self, x: &Entries, parameters: usize) -> LawRows<DVector<f64>> {
+        let mut rows = self.law_rows(x);
+        let Some(model) = self.0.model().filter(|_| parameters > 0) else { return rows };
+        let extend = |row: &mut DVector<f64>, law: usize| {
+            let (along, _) = law_along_parameters(model, law, x, parameters);
+            *row =
+                DVector::from_iterator(row.len() + parameters, row.iter().chain(&along).copied());
+        };
+        extend(&mut rows.energy, ENERGY);
+        extend(&mut rows.entropy, ENTROPY);
+        rows.invariants.iter_mut().enumerate().for_each(|(k, row)| extend(row, ENTROPY + 1 + k));
+        rows
+    }
+
+    fn carry(
+        &self,
+        method: Option<Compiled>,
+        step: &Part<Self>,
+        carried: &Carried,
+    ) -> Result<Moved, Unlinearised> {
+        let n = self.directions();
+        let count = carried.t.nrows() - n;
+        let targets = (&targets(step), count);
+        let derivative = match self.exactly(method).ok_or(Unlinearised::Singular)? {
+            Exactly::Explicit(method) => {
+                let of = in_numbers(&self.0 as &dyn Equations, step, targets);
+                return explicit_propagate(method.tableau(), &of, carried);
+            }
+            Exactly::Midpoint(model, line) => {
+                schemes::derivative(&in_numbers(model, step, targets), line)
+            }
+            Exactly::Stages(model, tableau) => {
+                collocated::derivative(&in_numbers(model, step, targets), tableau)
+            }
+        };
+        let Derivative { along_x, along_parameters, along_h } = derivative?;
+        let mut next = carried.clone();
+        let moved = along_x * carried.t.rows(0, n) + along_parameters * carried.t.rows(n, count);
+        next.t.rows_mut(0, n).copy_from(&moved);
+        Ok(Moved { carried: next, along_h })
+    }
+
+    fn pull(
+        &self,
+        method: Option<Compiled>,
+        step: &Part<Self>,
+        costate: &DVector<f64>,
+    ) -> Result<DVector<f64>, Unlinearised> {
+        let n = self.directions();
+        let count = costate.len() - n;
+        let (targets, row) = ((&targets(step), count), &costate.as_slice()[..n]);
+        let (start, along) = match self.exactly(method).ok_or(Unlinearised::Singular)? {
+            Exactly::Midpoint(model, line) => {
+                schemes::pull_back(&in_numbers(model, step, targets), line, row)
+            }
+            Exactly::Stages(model, tableau) => {
+                collocated::pull_back(&in_numbers(model, step, targets), tableau, row)
+            }
+            Exactly::Explicit(_) => {
+                let here = Carried::start(self.rows(&step.x, count));
+                return Ok(self.carry(method, step, &here)?.carried.t.tr_mul(costate));
+            }
+        }?;
+        let along = along + costate.rows(n, count);
+        Ok(DVector::from_iterator(n + count, start.iter().chain(&along).copied()))
+    }
+
+    fn entropy_error(
+        &self,
+        method: Option<Compiled>,
+        step: &Part<Self>,
+        column: [&DVector<f64>; 2],
+    ) -> Option<f64> {
+        let targets = (&targets(step), column[0].len() - self.directions());
+        let column = column.map(|column| column.as_slice());
+        match self.exactly(method)? {
+            Exactly::Explicit(_) => None,
+            Exactly::Midpoint(model, line) => {
+                schemes::entropy_law(&in_numbers(model, step, targets), line, column)
+            }
+            Exactly::Stages(model, tableau) => {
+                collocated::entropy_law(&in_numbers(model, step, targets), tableau, column)
+            }
+        }
+    }
+
+    fn check_parameters(
+        &self,
+        x: &Entries,
+        values: &[f64],
+        displaced: &dyn Fn(&[f64]) -> Option<Self>,
+    ) -> Result<(), ModelError> {
+        let beside = |by: &[f64], f: &mut dyn FnMut(&dyn Model)| {
+            displaced(by).is_some_and(|flow| flow.0.model().map(f).is_some())
+        };
+        Judge::of(&self.0, NO_CLOCK).check_parameters(x, values, &beside)
+    }
+}
+
 /// The derivatives are exact on a [model](metriplectic_equations::Model) on a vector space with the canonical metric; to two thirds of the digits where it has
 /// [differences](metriplectic_equations::Differences), and for explicit methods where its parts are not known apart. Other
 /// methods and spaces have them by differences of steps: to some ten digits, and to eight or nine where the charts of a curved space are
@@ -197,7 +313,7 @@ impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
     type MovingWide = Vec<Real>;
 
     fn takes_steps_beside(&self, method: &M) -> bool {
-        self.exactly(method.compiled()).is_none()
+        !self.has_steps(method.compiled())
     }
 
     fn propagate(
@@ -206,25 +322,12 @@ impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
         step: &Part<Self>,
         carried: &Carried,
     ) -> Result<Moved, Unlinearised> {
-        let targets = targets(step);
-        let derivative = match self.exactly(method.compiled()) {
-            None => return beside::propagate((self, method, &NoParameters), step, carried),
-            Some(Exactly::Explicit(method)) => {
-                let of = in_numbers(&self.0 as &dyn Equations, step, &targets);
-                return explicit_propagate(method.tableau(), &of, carried);
-            }
-            Some(Exactly::Midpoint(model, line)) => {
-                schemes::derivative(&in_numbers(model, step, &targets), line)
-            }
-            Some(Exactly::Stages(model, tableau)) => {
-                collocated::derivative(&in_numbers(model, step, &targets), tableau)
-            }
-        };
-        let Derivative { along_x, along_h } = derivative?;
-        Ok(Moved {
-            carried: Carried { t: along_x * &carried.t, laws: carried.laws.clone() },
-            along_h,
-        })
+        let compiled = method.compiled();
+        if self.has_steps(compiled) {
+            self.carry(compiled, step, carried)
+        } else {
+            beside::propagate((self, method, &NoParameters), step, carried)
+        }
     }
 
     fn pull_back(
@@ -233,18 +336,11 @@ impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
         step: &Part<Self>,
         costate: &DVector<f64>,
     ) -> Result<DVector<f64>, Unlinearised> {
-        let (targets, row) = (targets(step), costate.as_slice());
-        match self.exactly(method.compiled()) {
-            Some(Exactly::Midpoint(model, line)) => {
-                schemes::pull_back(&in_numbers(model, step, &targets), line, row)
-            }
-            Some(Exactly::Stages(model, tableau)) => {
-                collocated::pull_back(&in_numbers(model, step, &targets), tableau, row)
-            }
-            Some(Exactly::Explicit(_)) | None => {
-                let here = Carried::start(self.law_rows(&step.x));
-                Ok(self.propagate(method, step, &here)?.carried.t.tr_mul(costate))
-            }
+        let compiled = method.compiled();
+        if self.has_steps(compiled) {
+            self.pull(compiled, step, costate)
+        } else {
+            beside::pull_back((self, method, &NoParameters), step, costate)
         }
     }
 
@@ -254,16 +350,7 @@ impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
         step: &Part<Self>,
         column: [&DVector<f64>; 2],
     ) -> Option<f64> {
-        let (targets, column) = (targets(step), column.map(|column| column.as_slice()));
-        match self.exactly(method.compiled())? {
-            Exactly::Explicit(_) => None,
-            Exactly::Midpoint(model, line) => {
-                schemes::entropy_law(&in_numbers(model, step, &targets), line, column)
-            }
-            Exactly::Stages(model, tableau) => {
-                collocated::entropy_law(&in_numbers(model, step, &targets), tableau, column)
-            }
-        }
+        self.entropy_error(method.compiled(), step, column)
     }
 
     fn moved_along(&self, x: &Entries, v: &DVector<f64>) -> Vec<Real> {

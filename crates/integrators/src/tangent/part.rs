@@ -23,6 +23,8 @@ pub(super) struct Again<V> {
     pub(super) sizes: V,
     /// The size of the whole step.
     pub(super) whole: f64,
+    /// Whether no step beside it has another time or another size, because a corner is near.
+    pub(super) is_still: bool,
 }
 
 /// The memory with which a step is taken again.

@@ -76,21 +76,20 @@ where
     Ok(again.parts)
 }
 
-/// The derivatives at the end of a step.
-pub(super) fn propagate<D, M>(
+/// The derivatives at the end of a step of size `h` in parts.
+pub(super) fn through<D, M>(
     (system, method): (&D, &M),
-    start: &StepStart<'_, FlowOf<D>>,
-    ended: &Ended<'_, FlowOf<D>>,
+    (parts, h): (&[Part<FlowOf<D>>], f64),
     carried: &Carried,
 ) -> Result<Moved, Unlinearised>
 where
     D: Differentiated<M>,
     M: Stepper<FlowOf<D>>,
 {
-    let (parts, n) = (parts(method, start, ended)?, system.as_flow().directions());
+    let n = system.as_flow().directions();
     let (mut carried, is_whole) = (carried.clone(), parts.len() == 1);
     let mut along_h = DVector::zeros(n);
-    for part in &parts {
+    for part in parts {
         let next = system.propagate(method, part, &carried)?;
         if is_whole {
             return Ok(next);
@@ -101,7 +100,7 @@ where
             let moved = system.propagate(method, part, &here)?.carried.t;
             along_h = moved.view((0, 0), (n, n)) * along_h;
         }
-        along_h += next.along_h * (part.h / ended.h);
+        along_h += next.along_h * (part.h / h);
         carried = next.carried;
     }
     Ok(Moved { carried, along_h })

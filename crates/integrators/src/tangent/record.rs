@@ -57,7 +57,7 @@ pub trait Tangents: Sized {
     ///
     /// # Errors
     ///
-    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has corners or jumps without
+    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has jumps without
     /// [derivatives](crate::Jumping::differentiable).
     fn tangent_steps<D>(
         self,
@@ -72,6 +72,7 @@ pub trait Tangents: Sized {
         let schedule: Schedule = schedule.into();
         let jumps = smooth_events((system, &self), &schedule)?;
         let steps = self.steps(system.as_flow(), x0, schedule)?;
+        system.check_parameters(&steps.state().point).map_err(RunError::from)?;
         let laws = in_wide_room::<D, Self, _>(system, || system.wide_rows(&steps.state().point));
         let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());
         Ok(TangentSteps { system, steps, carried, sensitivity, jumps, largest: None })

@@ -73,6 +73,7 @@ where
     at.same_function(zero.re, &dg)?;
     let late = |k: usize| if flow.clock() == Some(k) { 1.0 } else { 0.0 };
     let along = DVector::from_fn(all, |k, _| -function(late(k), &unit(k)).eps1 / zero.eps1);
+    at.has_velocity(&along, late)?;
     let mut matrix = DMatrix::identity(all, all) + &before * along.transpose();
     let Some((y, map)) = landing else { return Ok(Crossing { matrix, time: along }) };
     let after = system
@@ -120,8 +121,9 @@ where
         // A run that is over ends with the state after the jump.
         let is_over = self.steps.ending().is_some() && asked.pop().is_some();
         for (step, time) in asked {
-            let (point, moved) = self.part((&last, again), (time - start) / h).map_err(failed)?;
-            inside.outputs.push(self.at(step, time, point, moved.carried));
+            let place = ((time - start) / h, time);
+            let (part, moved) = self.part((&last, again), place).map_err(failed)?;
+            inside.outputs.push(self.at(step, time, part.end, moved.carried));
         }
         for event in found {
             let theta = (event.state.time - start) / h;

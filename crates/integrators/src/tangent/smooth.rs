@@ -5,6 +5,7 @@ use metriplectic_fields::{Column as _, Dimension as _, Jet1, Real, ScalarField, 
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{LawRows, jets};
+use super::exact::ExactSteps;
 use super::frames::between;
 use crate::noise::{Fluctuating, Noisy};
 use crate::step::{Dim, Element, Flow, HasFlow};
@@ -56,6 +57,11 @@ pub trait SmoothFlow: Flow + Sized {
 
     /// Computes the coordinates of a moving state around `y`, with their first derivative. A ledger has none.
     fn coordinates(&self, y: &Element<Self>, there: &Self::Moving) -> Vec<[f64; 2]>;
+
+    /// Returns the exact derivatives of steps, if the flow knows some.
+    fn exact_steps(&self) -> Option<&dyn ExactSteps<Self>> {
+        None
+    }
 }
 
 /// The flow of a system.

@@ -11,8 +11,8 @@ use super::columns::{Carried, Moved};
 use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
-use super::part::{Again, Ended, Part, memory_before};
-use super::pieces::propagate;
+use super::part::Again;
+use super::product::{Product, Reach, Step, product, propagate};
 use super::smooth::{FlowOf, SmoothFlow as _, SpaceOf, VectorOf};
 use super::state::TangentState;
 use crate::round_off::bound::SUMMED;
@@ -20,7 +20,6 @@ use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::event::{Event, Request};
 use crate::run::jump::SmoothEvent;
-use crate::run::last_step::LastStep;
 use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::step::{Element, Flow, Scales, Stepper, Vector as _};
@@ -52,17 +51,19 @@ pub(super) fn again<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
         None => known,
     };
     *largest = Some(sizes.clone());
-    Some(Again { memory: steps.saved_memory(), sizes, whole: f64::NAN })
+    Some(Again { memory: steps.saved_memory(), sizes, whole: f64::NAN, is_still: false })
 }
 
-/// The sizes of the entries at an event: the largest ones of the run, and those there.
+/// The sizes of the entries at an event: the largest ones of the run, and those there. Its function does not depend on a ledger, whose
+/// entries may be small and fast.
 pub(super) fn sizes_at<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     (system, _): (&D, &M),
     scales: &Scales<VectorOf<D>>,
     x: &Element<FlowOf<D>>,
 ) -> DVector<f64> {
     let (ends, reached) = (&scales.sizes, system.units(x));
-    DVector::from_fn(system.as_flow().directions(), |i, _| ends.get(i).max(reached[i]))
+    let size = |i: usize| if i < ends.len() { ends.get(i).max(reached[i]) } else { 0.0 };
+    DVector::from_fn(system.as_flow().directions(), |i, _| size(i))
 }
 
 /// The sizes of all directions after a step of size `h`, which is that of a clock.
@@ -112,7 +113,7 @@ pub(super) type Jumps<P> = Vec<Option<Arc<SmoothEvent<P>>>>;
 ///
 /// # Errors
 ///
-/// [`TangentError::Broken`] if a jump has no derivatives, a path with noise has events, or there are corners.
+/// [`TangentError::Broken`] if a jump has no derivatives, or a path with noise has events.
 pub(super) fn smooth_events<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     (system, method): (&D, &M),
     schedule: &Schedule,
@@ -125,8 +126,6 @@ pub(super) fn smooth_events<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
     };
     let what = if events.iter().zip(&smooth).any(lacks_map) {
         "jumps without derivatives"
-    } else if !schedule.corners.is_empty() {
-        "corners"
     } else if schedule.backward {
         "a run back in time"
     } else if method.noise(system.as_flow()).is_some() && !events.is_empty() {
@@ -235,13 +234,13 @@ where
             return Err(TangentError::Broken { what: "outputs inside steps of a path with noise" });
         }
         for &(step, time) in &asked[..at_end] {
-            let (point, moved) = self.part((last, again), theta(time)).map_err(failed)?;
-            inside.outputs.push(self.at(step, time, point, moved.carried));
+            let (part, moved) = self.part((last, again), (theta(time), time)).map_err(failed)?;
+            inside.outputs.push(self.at(step, time, part.end, moved.carried));
         }
         let state = self.steps.state();
-        let ended = Ended::of_run(&state.point, last).with_again(again, last.h);
-        let next = propagate((system, self.steps.method()), &last.start, &ended, &self.carried)
-            .map_err(failed)?;
+        let of = (system, self.steps.method());
+        let whole = product(of, (last, again), &Reach::End(&state.point)).map_err(failed)?;
+        let next = propagate(of, &whole, &self.carried).map_err(failed)?;
         let (rows, units) = (system.wide_rows(&state.point), self.units(&state.point, last.h));
         let rests = self.is_same_point(last.start.x, &state.point);
         if rests && system.takes_steps_beside(self.steps.method()) {
@@ -252,12 +251,14 @@ where
             self.sensitivity.enter(&rows, &units, &next.carried, rounding).map_err(failed)?;
         }
         // One column after the other, since the definition of the step at dual numbers is dear.
-        if state.step.is_power_of_two() && !last.in_parts {
-            let part = Part::new(&last.start, &ended);
+        if let Some(part) = whole.single()
+            && state.step.is_power_of_two()
+            && !last.in_parts
+        {
             let j = state.step.trailing_zeros() as usize % self.carried.t.ncols();
             let [before, after] =
                 [&self.carried.t, &next.carried.t].map(|t| t.column(j).into_owned());
-            let law = system.second_law_error(self.steps.method(), &part, [&before, &after]);
+            let law = system.second_law_error(self.steps.method(), part, [&before, &after]);
             self.sensitivity.enter_entropy(law);
         }
         self.sensitivity.frozen = self.steps.is_adaptive();
@@ -295,38 +296,38 @@ where
     /// The state at a fraction of the last step, by a step of that size, with its derivatives.
     pub(super) fn part(
         &self,
-        (last, again): (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
-        theta: f64,
-    ) -> Result<(Element<FlowOf<D>>, Moved), Unlinearised> {
-        let (method, h) = (self.steps.method(), theta * last.h);
-        let mut memory = memory_before::<FlowOf<D>, M>(again)?;
-        let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-        let ended = Ended::new(&taken, h, &memory).with_again(again, last.h);
-        let moved = propagate((self.system, method), &last.start, &ended, &self.carried)?;
-        Ok((taken.x, moved))
+        step: Step<'_, FlowOf<D>>,
+        (theta, time): (f64, f64),
+    ) -> Result<(Product<FlowOf<D>>, Moved), Unlinearised> {
+        let of = (self.system, self.steps.method());
+        let part = product(of, step, &Reach::Inside { theta, time })?;
+        let moved = propagate(of, &part, &self.carried)?;
+        Ok((part, moved))
     }
 
     /// An event of the last step with its derivatives, in the frame of its own state.
     pub(super) fn event(
         &self,
-        last: (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
+        step: Step<'_, FlowOf<D>>,
         scales: &Scales<VectorOf<D>>,
         event: Event<SpaceOf<D>>,
         theta: f64,
     ) -> Result<TangentEvent<FlowOf<D>>, Unlinearised> {
         let flow = self.steps.flow();
-        let (reached, Moved { mut carried, along_h: mut velocity }) = self.part(last, theta)?;
+        let place = (theta, event.state.time);
+        let (Product { end, across, .. }, Moved { mut carried, along_h: mut velocity }) =
+            self.part(step, place)?;
         if velocity.iter().any(|v| v.is_nan()) {
             return Err(Unlinearised::Branch);
         }
         // The state of the output is not that of the step of this size, and may have another frame.
-        if let Some(turn) = flow.turn(&reached, &event.state.point) {
+        if let Some(turn) = flow.turn(&end, &event.state.point) {
             velocity = &turn * velocity;
             turn_rows(&turn, &mut carried.t);
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), carried);
         let sizes = sizes_at((self.system, self.steps.method()), scales, &state.point);
-        Ok(TangentEvent { event, state, velocity, sizes, after: None })
+        Ok(TangentEvent { event, state, velocity, sizes, across, after: None })
     }
 }

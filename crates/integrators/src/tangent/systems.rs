@@ -3,21 +3,28 @@
 use std::fmt;
 use std::ops::Deref;
 
+use metriplectic_dynamics::ModelError;
 use metriplectic_fields::Real;
-use nalgebra::{DVector, SVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 use super::beside::{self, Parameters};
 use super::columns::{Carried, LawRows, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
+use super::exact::ExactSteps;
+use super::explicit::NEAR;
 use super::part::Part;
 use super::smooth::SmoothFlow;
+use crate::round_off::bound::SUMMED;
 use crate::step::{Element, Flow, HasFlow, Stepper, Vector as _};
 
 /// Systems of any kind with named parameters: with ports, baths and noise, lattices, systems of your own.
 ///
-/// A [member](Self::at) has [tangents](crate::Tangents) and [adjoints](crate::Adjoints) along its start and its parameters, by
-/// differences of steps beside each step, to some ten digits. Those of a [`Family`](metriplectic_dynamics::Family) are exact.
+/// A [member](Self::at) has [tangents](crate::Tangents) and [adjoints](crate::Adjoints) along its start and its parameters. They are exact for a
+/// [model](metriplectic_equations::Model) in plain numbers on a vector space, along its start and, if it
+/// [knows as many](metriplectic_equations::Model::parameters), along the parameters, whose derivatives are compared with values at the start
+/// of the run. Others are differences of steps beside each step, to some ten digits. Those of a
+/// [`Family`](metriplectic_dynamics::Family) are exact.
 ///
 /// ```
 /// use metriplectic_dynamics::{Symplectic, System};
@@ -78,7 +85,7 @@ impl<B, const P: usize> Systems<B, P> {
 
     /// Builds the system at values of the parameters, whose runs have derivatives along them.
     ///
-    /// A tangent builds systems at parameters some 10⁻⁵ of their sizes away. What a closure of the schedule captures, as that of a
+    /// A tangent by differences builds systems at parameters some 10⁻⁵ of their sizes away. What a closure of the schedule captures, as that of a
     /// jump, stays as it is: write there what depends on parameters by [`differentiable`](crate::Jumping::differentiable), whose
     /// maps take the state and the parameters.
     ///
@@ -164,13 +171,17 @@ impl<S> fmt::Debug for SystemAt<'_, S> {
     }
 }
 
-impl<S> Parameters<S> for SystemAt<'_, S> {
+impl<S: SmoothFlow> Parameters<S> for SystemAt<'_, S> {
     fn values(&self) -> &[f64] {
         &self.values
     }
 
     fn displaced(&self, by: &[f64]) -> Result<S, Unlinearised> {
         (self.beside)(by).map_err(|()| Unlinearised::NoSystem)
+    }
+
+    fn known_rows(&self, x: &Element<S>) -> Option<LawRows<DVector<f64>>> {
+        self.known().map(|exact| exact.rows(x, self.values.len()))
     }
 }
 
@@ -182,6 +193,64 @@ impl<S> SystemAt<'_, S> {
     }
 }
 
+impl<S: SmoothFlow> SystemAt<'_, S> {
+    /// The exact derivatives of steps, if they are known along all parameters.
+    fn known(&self) -> Option<&dyn ExactSteps<S>> {
+        let exact = self.system.exact_steps();
+        exact.filter(|exact| exact.known_parameters() == self.values.len())
+    }
+
+    /// The exact derivatives of the steps of a method along their start, and whether they are known along all parameters.
+    fn exact<M: Stepper<S>>(&self, method: &M) -> Option<(&dyn ExactSteps<S>, bool)> {
+        let exact = self.system.exact_steps().filter(|exact| exact.has_steps(method.compiled()))?;
+        Some((exact, self.known().is_some()))
+    }
+
+    /// The derivatives of a step along the parameters alone, a column for each, by differences of steps; and those of the laws at its
+    /// start in all directions.
+    fn along_parameters<M: Stepper<S>>(
+        &self,
+        method: &M,
+        step: &Part<S>,
+    ) -> Result<(DMatrix<f64>, LawRows<DVector<f64>>), Unlinearised> {
+        self.sized()?;
+        let (n, count) = (self.system.directions(), self.values.len());
+        let here = beside::law_rows(&self.system, self, &step.x)?;
+        let mut t = DMatrix::zeros(n + count, count);
+        t.view_mut((n, 0), (count, count)).fill_with_identity();
+        let laws = here.map(|row| row.rows(n, count).into_owned());
+        let carried = Carried { t, laws };
+        let moved = beside::propagate((&self.system, method, self), step, &carried)?;
+        Ok((moved.carried.t.rows(0, n).into_owned(), here))
+    }
+
+    /// The derivatives at the end of a step: exact ones along its start, and differences of steps along the parameters.
+    fn carry<M: Stepper<S>>(
+        &self,
+        exact: &dyn ExactSteps<S>,
+        method: &M,
+        step: &Part<S>,
+        carried: &Carried,
+    ) -> Result<Moved, Unlinearised> {
+        let (n, count) = (self.system.directions(), self.values.len());
+        let (along, here) = self.along_parameters(method, step)?;
+        let [start, parameters] =
+            [(0, n), (n, count)].map(|(at, len)| carried.t.rows(at, len).into_owned());
+        // A column is the sum of one along the start and of one along the parameters, and so is the derivative of each law.
+        let own =
+            |row: &DVector<f64>, here: &DVector<f64>| row - parameters.tr_mul(&here.rows(n, count));
+        let LawRows { energy, invariants, .. } = &carried.laws;
+        let invariants = invariants.iter().zip(&here.invariants).map(|(row, here)| own(row, here));
+        let entropy = start.tr_mul(&here.entropy.rows(0, n));
+        let laws = LawRows::new(own(energy, &here.energy), entropy, invariants.collect());
+        let alone = Carried { t: start, laws };
+        let Moved { carried: moved, along_h } = exact.carry(method.compiled(), step, &alone)?;
+        let mut next = carried.clone();
+        next.t.rows_mut(0, n).copy_from(&(moved.t + along * parameters));
+        Ok(Moved { carried: next, along_h })
+    }
+}
+
 impl<S: Flow> HasFlow for SystemAt<'_, S> {
     type Flow = S;
 
@@ -190,12 +259,21 @@ impl<S: Flow> HasFlow for SystemAt<'_, S> {
     }
 }
 
-/// By differences of steps.
+/// Exact as far as the system knows the derivatives of its steps, and by differences of steps beyond.
 impl<S: SmoothFlow, M: Stepper<S>> Differentiated<M> for SystemAt<'_, S> {
     type MovingWide = (S::Moving, Vec<Real>);
 
     fn names(&self) -> &[&'static str] {
         self.names
+    }
+
+    fn takes_steps_beside(&self, method: &M) -> bool {
+        !self.exact(method).is_some_and(|(_, all)| all)
+    }
+
+    fn check_parameters(&self, x: &Element<S>) -> Result<(), ModelError> {
+        let displaced = |by: &[f64]| self.displaced(by).ok();
+        self.known().map_or(Ok(()), |exact| exact.check_parameters(x, &self.values, &displaced))
     }
 
     fn wide_rows(&self, x: &Element<S>) -> LawRows<DVector<f64>> {
@@ -218,7 +296,11 @@ impl<S: SmoothFlow, M: Stepper<S>> Differentiated<M> for SystemAt<'_, S> {
         step: &Part<S>,
         carried: &Carried,
     ) -> Result<Moved, Unlinearised> {
-        self.sized()?;
+        match self.exact(method) {
+            Some((exact, true)) => return exact.carry(method.compiled(), step, carried),
+            Some((exact, false)) => return self.carry(exact, method, step, carried),
+            None => self.sized()?,
+        }
         beside::propagate((&self.system, method, self), step, carried)
     }
 
@@ -228,8 +310,73 @@ impl<S: SmoothFlow, M: Stepper<S>> Differentiated<M> for SystemAt<'_, S> {
         step: &Part<S>,
         costate: &DVector<f64>,
     ) -> Result<DVector<f64>, Unlinearised> {
-        self.sized()?;
+        match self.exact(method) {
+            Some((exact, true)) => return exact.pull(method.compiled(), step, costate),
+            Some((exact, false)) => {
+                let (n, count) = (self.system.directions(), self.values.len());
+                let (along, _) = self.along_parameters(method, step)?;
+                let row = costate.rows(0, n).into_owned();
+                let start = exact.pull(method.compiled(), step, &row)?;
+                let along = along.tr_mul(&row) + costate.rows(n, count);
+                return Ok(DVector::from_iterator(n + count, start.iter().chain(&along).copied()));
+            }
+            None => self.sized()?,
+        }
         beside::pull_back((&self.system, method, self), step, costate)
+    }
+
+    fn check_corner(
+        &self,
+        sides: [&Element<S>; 2],
+        sizes: Option<&S::Vector>,
+        h: f64,
+    ) -> Result<(), Unlinearised> {
+        let zero = self.system.sizes(sides[0]).zero();
+        let numbers = |flow: &S, x: &Element<S>| {
+            let mut numbers = vec![flow.laws(x).energy];
+            numbers.extend(flow.rates(x, &zero).map_or_else(Vec::new, |rates| rates.to_list()));
+            numbers
+        };
+        let [before, behind] = sides.map(|x| numbers(&self.system, x));
+        let jumps: Vec<f64> = before.iter().zip(&behind).map(|(a, b)| (b - a).abs()).collect();
+        // A jump within the round-off of the energy, or one that moves an entry by none of its size, has no derivative to lose.
+        let is_sized = |i: usize| match i.checked_sub(1) {
+            None => jumps[i] > SUMMED * self.system.term_sizes(sides[0]).energy,
+            Some(k) => {
+                let size = sizes.filter(|sizes| k < sizes.len()).map(|sizes| sizes.get(k));
+                let moves = size.is_none_or(|size| jumps[i] * h.abs() > NEAR * size);
+                moves && jumps[i] > NEAR * before[i].abs().max(behind[i].abs())
+            }
+        };
+        for (k, name) in self.names.iter().enumerate() {
+            let at = |x: &Element<S>, e: f64| {
+                let mut by = vec![0.0; self.values.len()];
+                by[k] = e;
+                Ok::<_, Unlinearised>(numbers(&self.displaced(&by)?, x))
+            };
+            let e = beside::displacement(self.values[k]);
+            for x in sides {
+                let [a, b, c, d] = [at(x, e)?, at(x, -e)?, at(x, 2.0 * e)?, at(x, -2.0 * e)?];
+                // The difference of a smooth function doubles, and that of one that jumps stays.
+                let is_off = |i: usize| {
+                    2.0 * ((c[i] - d[i]) - 2.0 * (a[i] - b[i])).abs() > jumps[i] && is_sized(i)
+                };
+                if (0..jumps.len()).any(is_off) {
+                    return Err(Unlinearised::MovingCorner { name });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn second_law_error(
+        &self,
+        method: &M,
+        step: &Part<S>,
+        column: [&DVector<f64>; 2],
+    ) -> Option<f64> {
+        let (exact, _) = self.exact(method).filter(|(_, all)| *all)?;
+        exact.entropy_error(method.compiled(), step, column)
     }
 
     fn moved_along(&self, x: &Element<S>, v: &DVector<f64>) -> Self::MovingWide {

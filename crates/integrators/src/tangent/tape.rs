@@ -9,8 +9,7 @@ use super::columns::{Carried, Moved};
 use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
 use super::event::Located;
-use super::part::{Again, Ended, Part, memory_before};
-use super::pieces::{parts, propagate};
+use super::product::{Product, Reach, Step, product, propagate};
 use super::saltation::{Crossing, crossing};
 use super::smooth::{FlowOf, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::{Jumps, again, rounding, sizes_at, smooth_events, turn_rows, units_at};
@@ -19,22 +18,21 @@ use crate::run::checkpoint::Checkpoint;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::event::Event;
-use crate::run::last_step::LastStep;
 use crate::run::method::Method as _;
 use crate::run::recording::Numbered;
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::step::{Element, Flow, HasFlow, Scales, StateSpace, Stepper, Taken};
+use crate::step::{Element, Flow, HasFlow, Scales, StateSpace, Stepper};
 
 /// A step of a run.
 pub(super) struct TapedStep<F: Flow> {
     /// The time of its start.
     pub(super) time: f64,
-    pub(super) parts: Vec<Part<F>>,
+    pub(super) product: Product<F>,
     pub(super) end: End,
     /// The steps to the recorded states inside it.
-    pub(super) outputs: Vec<Vec<Part<F>>>,
+    pub(super) outputs: Vec<Product<F>>,
     /// Its number, that of each part of a step between two jumps.
     number: usize,
 }
@@ -124,7 +122,7 @@ struct Recorder<'a, D: Differentiated<M>, M: Stepper<FlowOf<D>>> {
 type Recorded<F> = (TapedStep<F>, Vec<State<<F as Flow>::Space>>);
 
 /// A step up to the event that ends it.
-type UpTo<F> = (Vec<Part<F>>, End);
+type UpTo<F> = (Product<F>, End);
 
 impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
     fn segment(&self) -> Segment<VectorOf<D>> {
@@ -155,15 +153,21 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
         // A jump moves the end of the run, by which the others are divided.
         let whole = if is_cut { last.h } else { end.time - time };
         let theta = |inside: &State<SpaceOf<D>>| (inside.time - time) / whole;
-        let (parts, at_end) = match &event {
+        let of = (self.system, method);
+        let (whole_step, at_end) = match &event {
             Some(event) => self.up_to((&last, again), &scales, (event, theta(&event.state)))?,
             None => {
-                let ended = Ended::of_run(&end.point, &last).with_again(again, last.h);
-                (parts(method, &last.start, &ended).map_err(failed)?, End::Step)
+                let reach = Reach::End(&end.point);
+                (product(of, (&last, again), &reach).map_err(failed)?, End::Step)
             }
         };
-        let mut step =
-            TapedStep { time, parts, end: at_end, outputs: Vec::new(), number: self.number };
+        let mut step = TapedStep {
+            time,
+            product: whole_step,
+            end: at_end,
+            outputs: Vec::new(),
+            number: self.number,
+        };
         let asked: Vec<_> = self.steps.outputs().collect();
         let count = match &event {
             None => asked.iter().take_while(|state| state.step != end.step).count(),
@@ -181,10 +185,10 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
                 let what = "outputs inside steps of a path with noise";
                 return Err(TangentError::Broken { what });
             }
-            let Reached { taken, parts, .. } =
-                inside(method, (&last, again), theta(asked)).map_err(failed)?;
-            step.outputs.push(parts);
-            let point = taken.x;
+            let reach = Reach::Inside { theta: theta(asked), time: asked.time };
+            let output = product(of, (&last, again), &reach).map_err(failed)?;
+            let point = output.end.clone();
+            step.outputs.push(output);
             let laws = flow.laws(&point);
             let (energy, entropy) = (laws.energy, laws.entropy);
             states.push(State { point, energy, entropy, ..*asked });
@@ -195,24 +199,23 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
     /// The last step up to the event that ends it, at a fraction of it.
     fn up_to(
         &self,
-        (last, again): (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
+        (last, again): Step<'_, FlowOf<D>>,
         scales: &Scales<VectorOf<D>>,
         (event, theta): (&Event<SpaceOf<D>>, f64),
     ) -> Result<UpTo<FlowOf<D>>, TangentError<SpaceOf<D>>> {
         let (system, method) = (self.system, self.steps.method());
         let failed = |cause| TangentError::NotLinearised { time: last.start.time, cause };
-        let reached = inside(method, (last, again), theta).map_err(failed)?;
-        let Some(smooth) = &self.events[event.index] else { return Ok((reached.parts, End::Stop)) };
-        let ended =
-            Ended::new(&reached.taken, theta * last.h, &reached.memory).with_again(again, last.h);
+        let reach = Reach::Inside { theta, time: event.state.time };
+        let up_to = product((system, method), (last, again), &reach).map_err(failed)?;
+        let Some(smooth) = &self.events[event.index] else { return Ok((up_to, End::Stop)) };
         let here = Carried::start(system.wide_rows(last.start.x));
         let Moved { mut carried, along_h: mut velocity } =
-            propagate((system, method), &last.start, &ended, &here).map_err(failed)?;
+            propagate((system, method), &up_to, &here).map_err(failed)?;
         if velocity.iter().any(|v| v.is_nan()) {
             return Err(failed(Unlinearised::Branch));
         }
         let x = &event.state.point;
-        let turn = system.as_flow().turn(&reached.taken.x, x);
+        let turn = system.as_flow().turn(&up_to.end, x);
         if let Some(turn) = &turn {
             velocity = turn * velocity;
             turn_rows(turn, &mut carried.t);
@@ -221,31 +224,12 @@ impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
         let rounding = rounding((system, method));
         Sensitivity::default().enter(&rows, &units, &carried, rounding).map_err(failed)?;
         let sizes = &sizes_at((system, method), scales, x);
-        let at = Located { event, velocity: &velocity, sizes };
+        let across = up_to.across.as_ref();
+        let at = Located { event, velocity: &velocity, sizes, across };
         let after = event.jump.as_ref().map(|_| &self.steps.state().point);
         let crossing = crossing((system, method), &at, smooth, after)?;
-        Ok((reached.parts, End::Event { crossing, turn, stops: after.is_none() }))
+        Ok((up_to, End::Event { crossing, turn, stops: after.is_none() }))
     }
-}
-
-/// The state at a fraction of a step, with the step to it.
-struct Reached<F: Flow, M: Stepper<F>> {
-    taken: Taken<F>,
-    memory: M::Memory,
-    parts: Vec<Part<F>>,
-}
-
-/// The state at a fraction of a step, by a step of that size.
-fn inside<F: Flow, M: Stepper<F>>(
-    method: &M,
-    (last, again): (&LastStep<'_, F>, Option<&Again<F::Vector>>),
-    theta: f64,
-) -> Result<Reached<F, M>, Unlinearised> {
-    let (h, mut memory) = (theta * last.h, memory_before::<F, M>(again)?);
-    let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-    let ended = Ended::new(&taken, h, &memory).with_again(again, last.h);
-    let parts = parts(method, &last.start, &ended)?;
-    Ok(Reached { taken, memory, parts })
 }
 
 impl<F: SmoothFlow> Tape<F> {
@@ -261,6 +245,8 @@ impl<F: SmoothFlow> Tape<F> {
     {
         let events = smooth_events((system, &method), &schedule)?;
         let steps = method.steps(system.as_flow(), x0, schedule.clone())?;
+        let checked = Differentiated::<M>::check_parameters(system, &steps.state().point);
+        checked.map_err(RunError::<F::Space>::from)?;
         let start = Taped { state: steps.state().clone(), number: 0 };
         let mut recording = steps.recording(start).map_err(RunError::<F::Space>::from)?;
         let mut recorder = Recorder { system, steps, events, number: 0, largest: None };

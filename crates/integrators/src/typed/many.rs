@@ -1,5 +1,5 @@
-//! Typed systems of many variables on a vector space take steps with stages in plain numbers, where a Jacobian serves many steps and no
-//! matrix is copied.
+//! Typed systems of many variables on a vector space take implicit steps in plain numbers, where no matrix is copied, and a Jacobian of
+//! stages serves many steps.
 
 use metriplectic_dynamics::{InNumbers, Metriplectic, system::Point};
 use metriplectic_fields::{Dimension as _, Space as _};
@@ -18,7 +18,12 @@ const FEW: usize = 8;
 
 /// Returns whether a system takes its steps with stages in plain numbers.
 pub(super) const fn is_of_many<Y: Metriplectic>() -> bool {
-    Dim::<Y>::LEN > FEW && Y::Manifold::IS_VECTOR_SPACE && Y::Metric::IS_CANONICAL
+    has_more::<Y>(FEW)
+}
+
+/// Returns whether a system on a vector space with the canonical metric has more than `few` variables.
+pub(super) const fn has_more<Y: Metriplectic>(few: usize) -> bool {
+    Dim::<Y>::LEN > few && Y::Manifold::IS_VECTOR_SPACE && Y::Metric::IS_CANONICAL
 }
 
 /// The memory of a method for typed systems, of few variables or of many.

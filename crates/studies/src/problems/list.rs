@@ -83,6 +83,14 @@ fn inertia(full: Matrix3<f64>, leaning: f64) -> impl Fn(&Matrix3<Real>) -> Matri
     }
 }
 
+/// A metric of SO(3) × R³ that leans with the attitude.
+fn leaning_metric((r, _): &(Matrix3<Real>, Vector3<Real>)) -> Matrix6<Real> {
+    let mut g = Matrix6::identity();
+    let lean = Vector6::new(r.m13, r.m23, r.m33, Real::from(0.5), r.m31, Real::from(0.0));
+    g += lean * lean.transpose() * Real::from(0.3);
+    g
+}
+
 /// A point of norm 1 off every axis.
 fn off_axis<const A: usize>() -> SVector<f64, A> {
     SVector::<f64, A>::from_fn(|i, _| 1.0 + 0.3 * i as f64).normalize()
@@ -372,14 +380,8 @@ pub(super) fn products(study: &mut impl Study, constants: Constants) {
     let (name, manifold) = ("heavy body", "SO(3) × R³");
     geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
-    let full: fn(&(Matrix3<Real>, Vector3<Real>)) -> Matrix6<Real> = |(r, _)| {
-        let mut g = Matrix6::identity();
-        let lean = Vector6::new(r.m13, r.m23, r.m33, Real::from(0.5), r.m31, Real::from(0.0));
-        g += lean * lean.transpose() * Real::from(0.3);
-        g
-    };
     let system = System::on(Product(Rotations, Euclidean::<3>))
-        .metric(Metric::field(full))
+        .metric(Metric::field(leaning_metric))
         .energy(plus(heavy_energy, h))
         .entropy(plus(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3, s))
         .build()

@@ -63,7 +63,7 @@ impl Collocation {
     ) -> Option<[L::Vector; 2]> {
         let velocity = |i: usize| parts[i].velocity(ends[i]).filter(is_finite);
         let [first, second] = [velocity(0)?, velocity(1)?];
-        let (tableau, LastStep { k, filter }) = (self.tableau, memory.last.as_ref()?);
+        let (tableau, (k, filter)) = (self.tableau, memory.last_step()?);
         let (parts, x) = (parts[0], ends[0]);
         let u = combined(h, tableau.stages, &tableau.weights, k);
         let chart = StepChart::of(parts, x, u)?;

@@ -42,8 +42,8 @@ struct Continued<L: Lengths> {
 pub(super) struct LastStep<L: Lengths> {
     /// The velocities of the stages.
     pub(super) k: Unknowns<L>,
-    /// The matrix `(I − γhJ)⁻¹` there.
-    pub(super) filter: Matrix<L>,
+    /// The matrix `(I − γhJ)⁻¹` there, if it is not that of the derivatives in the memory.
+    filter: Option<Matrix<L>>,
 }
 
 // By hand, because lengths have none of these.
@@ -87,6 +87,26 @@ impl<L: Lengths> StageNumbers<L> {
         if !velocities.chain(last).chain(&self.compensation.0).all(has) {
             *self = Self::default();
         }
+    }
+
+    /// Keeps the velocities of the stages of a step that was taken, and its derivatives if they serve the next one.
+    pub(super) fn keep(&mut self, k: Unknowns<L>, mut linear: Linear<L>, is_kept: bool) {
+        let mut filter = None;
+        if is_kept {
+            linear.age += 1;
+            self.linear = Some(linear);
+        } else {
+            filter = Some(linear.inverse);
+            self.linear = None;
+        }
+        self.last = Some(LastStep { k, filter });
+    }
+
+    /// The velocities of the stages of the last step, and the matrix `(I − γhJ)⁻¹` there.
+    pub(super) fn last_step(&self) -> Option<(&Unknowns<L>, &Matrix<L>)> {
+        let LastStep { k, filter } = self.last.as_ref()?;
+        let of_kept = || self.linear.as_ref().map(|linear| &linear.inverse);
+        Some((k, filter.as_ref().or_else(of_kept)?))
     }
 
     /// The velocities of a step of size `h`, on the continued polynomial; none before the first step, and after one that was

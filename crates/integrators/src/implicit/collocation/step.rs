@@ -7,7 +7,7 @@ use super::covectors::zeros;
 use super::equation::StageEquation;
 use super::fallbacks;
 use super::linear::Linear;
-use super::memory::{LastStep, StageNumbers};
+use super::memory::StageNumbers;
 use super::solve::Solved;
 use crate::collocation::fallbacks::StepFailure;
 use crate::collocation::step::DAMPED_LAW;
@@ -95,9 +95,8 @@ impl Collocation {
                 return Err(failed(Cause::Unsolved));
             }
         }
-        let filter = linear.filter().clone();
         if rests {
-            memory.last = Some(LastStep { k, filter });
+            memory.keep(k, linear, false);
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
         if !equation.is_on_its_way(&k, &at.end) {
@@ -106,11 +105,11 @@ impl Collocation {
         if around.is_outside(&at.end) {
             return Err(failed(Cause::Edge));
         }
-        // Elsewhere the frame in which they are formed turns.
-        memory.linear = linear.kept(evaluations).filter(|_| parts.is_flat());
         let u = equation.displacement(&k);
         memory.note(tableau, (parts, x, h), &k);
-        memory.last = Some(LastStep { k, filter });
+        // Elsewhere the frame in which they are formed turns.
+        let is_kept = linear.is_kept(evaluations) && parts.is_flat();
+        memory.keep(k, linear, is_kept);
         let compensated = memory.compensation.add(parts, Path::Chart, [x, &at.end], &u);
         let (mut x_end, mut after) = match compensated {
             Some(moved) => {

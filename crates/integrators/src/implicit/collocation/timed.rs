@@ -83,11 +83,10 @@ impl<'a, L: Lengths> TimedStep<'a, L> {
         let mut solution = self.solution(&equation, &solved, effort)?;
         let Solved { k, linear, evaluations, .. } = solved;
         let u = equation.displacement(&k);
-        let filter = linear.filter().clone();
-        // Elsewhere the frame in which they are formed turns.
-        memory.linear = linear.kept(evaluations).filter(|_| parts.is_flat());
         memory.note(tableau, (parts, x, h), &k);
-        memory.last = Some(LastStep { k, filter });
+        // Elsewhere the frame in which they are formed turns.
+        let is_kept = linear.is_kept(evaluations) && parts.is_flat();
+        memory.keep(k, linear, is_kept);
         if let Some(moved) = memory.compensation.add(parts, Path::Chart, [x, &solution.end], &u) {
             solution.end = moved;
         }

@@ -1,12 +1,14 @@
 //! The equation of one step of the midpoint scheme, as in [`Residual`](crate::Residual), whose formula it is.
 
+use std::ops::Range;
+
 use metriplectic_equations::{ENERGY, ENTROPY};
 
-use super::gradient::{LawAlong, Line, MovingLine, Stable};
+use super::gradient::{LawAlong, Line, MovingLine, Slope, Stable};
 use crate::implicit::algebra::{Matrix, add, dot, is_finite};
 use crate::implicit::drift;
 use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
-use crate::implicit::velocity::{VelocityJet, velocity_jet, whole_velocity_jet};
+use crate::implicit::velocity::{Columns, VelocityJet, velocity_jet, whole_velocity_jet};
 use crate::newton::Stiffness;
 use crate::numbers::Lengths;
 use crate::round_off::bound::{ROUNDED, is_dissipated};
@@ -64,6 +66,29 @@ pub(crate) struct FromEnd<L: Lengths> {
     pub(crate) energy: L::Vector,
     /// The derivative of the growth `h⟨w_S, K̃ w_S⟩` of the entropy.
     pub(crate) growth: L::Vector,
+}
+
+/// The equation at its root, along parameters.
+pub(crate) struct AlongParameters<L: Lengths> {
+    /// The derivatives `h ∂V` of the motion, a column for each.
+    pub(crate) motion: Matrix<L>,
+    /// The derivatives of the growth of the entropy.
+    pub(crate) growth: L::Vector,
+}
+
+/// The derivative of the growth `h⟨w_S, K̃ w_S⟩` of the entropy.
+fn growth<L: Lengths>(
+    parts: &Parts<'_, L>,
+    h: f64,
+    jet: &VelocityJet<L>,
+    w: &OfLaws<WithJacobian<L>>,
+) -> L::Vector {
+    let mut growth = parts.zero();
+    if let Some(friction) = &jet.irreversible {
+        add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
+        add(&mut growth, h, &friction.slope.transpose_times(&w.entropy.value));
+    }
+    growth
 }
 
 /// The round-off of a residual, as in [`Rounding`](crate::Rounding).
@@ -156,28 +181,29 @@ impl<'a, L: Lengths> Equation<'a, L> {
     fn jets(
         &self,
         line: &Line<'_, L>,
-        mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Matrix<L>,
+        mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Slope<L>,
     ) -> Option<OfLaws<WithJacobian<L>>> {
         let parts = self.parts;
         let w = parts.each_law(|law| {
             if !self.is_discrete(law) {
                 let second = parts.second(law, &line.z);
-                let slope = line.dz().after(&second.hf);
-                return Some(WithJacobian { value: second.df, slope });
+                let slope = line.dz().after(second.hf);
+                return Some(WithJacobian::new(second.df, slope));
             }
             let [start, drift] = self.start_of(law);
             let (end, df) = parts.jet(law, &line.end);
             let along = LawAlong { parts, law, line };
             let stable = along.stable(self.line.gradient, [start, end], true)?;
             let value = stable.covector(drift, line);
-            Some(WithJacobian { value, slope: slope(law, stable, &df) })
+            let Slope { matrix: slope, apart } = slope(law, stable, &df);
+            Some(WithJacobian { value, slope, apart })
         });
         w.all()
     }
 
     /// The Jacobian `∂d − h ∂V` of the residual, from the derivatives of the velocity.
     #[inline]
-    fn jacobian(&self, line: &Line<'_, L>, velocity: &Matrix<L>) -> Matrix<L> {
+    fn jacobian(&self, line: &Line<'_, L>, velocity: Matrix<L>) -> Matrix<L> {
         let mut jacobian = velocity.map(|slope| -(slope * self.h));
         if let Some([_, dd, _]) = line.slopes() {
             jacobian.add(1.0, dd);
@@ -202,14 +228,48 @@ impl<'a, L: Lengths> Equation<'a, L> {
             }
             stable.slope_above_round_off(along, df)
         })?;
-        let jet = whole_velocity_jet(parts, &line.z, self.line.path.base(), &w)?;
-        let jacobian = self.jacobian(line, &jet.velocity.slope);
-        let mut growth = parts.zero();
-        if let Some(friction) = &jet.irreversible {
-            add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
-            add(&mut growth, h, &friction.slope.transpose_times(&w.entropy.value));
-        }
+        let columns = Columns::Directions(self.line.path.base());
+        let jet = whole_velocity_jet(parts, &line.z, columns, &w)?;
+        let growth = growth(parts, h, &jet, &w);
+        let jacobian = self.jacobian(line, jet.velocity.slope);
         jacobian.magnitude().is_finite().then_some(FromEnd { jacobian, energy, growth })
+    }
+
+    /// The derivatives along parameters at the root `u`, with both ends where they are, on a vector space; `None` where it is not defined.
+    pub(super) fn along_parameters(
+        &self,
+        u: &L::Vector,
+        parameters: Range<usize>,
+    ) -> Option<AlongParameters<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.path, u, false)?;
+        let kind = self.line.gradient;
+        let along: Vec<_> = parameters.clone().map(|k| parts.along_parameter(k)).collect();
+        let w = parts.each_law(|law| {
+            let of_law = LawAlong { parts, law, line };
+            let value = if self.is_discrete(law) {
+                let ends = [self.start_of(law)[0], parts.value(law, &line.end)];
+                of_law.stable(kind, ends, false)?.covector(0.0, line)
+            } else {
+                parts.jet(law, &line.z).1
+            };
+            let mut slope = parts.zeros();
+            for (c, parts) in along.iter().enumerate() {
+                let column = if self.is_discrete(law) {
+                    LawAlong { parts, law, line }.above_round_off(kind)
+                } else {
+                    parts.jet(law, &line.z).1
+                };
+                (0..parts.n()).for_each(|i| slope[(i, c)] = column[i]);
+            }
+            Some(WithJacobian::new(value, slope))
+        });
+        let w = w.all()?;
+        let columns = Columns::Parameters(parameters);
+        let jet = whole_velocity_jet(parts, &line.z, columns, &w)?;
+        let growth = growth(parts, h, &jet, &w);
+        let motion = jet.velocity.slope.map(|slope| slope * h);
+        motion.magnitude().is_finite().then_some(AlongParameters { motion, growth })
     }
 
     /// The residual with its Jacobian; `None` where it is not defined.
@@ -246,7 +306,7 @@ impl<'a, L: Lengths> Equation<'a, L> {
             Stiffness { friction: 2.0 * h.abs() * friction, rotation: 2.0 * h.abs() * rotation };
         let evidence = self.dissipated(&w.entropy.value, production);
         let residual = parts.vector(|i| d[i] - velocity.value[i] * h);
-        let jacobian = self.jacobian(line, &velocity.slope);
+        let jacobian = self.jacobian(line, velocity.slope);
         let is_usable = is_finite(&residual) && jacobian.magnitude().is_finite();
         is_usable.then(|| Linearised {
             residual,

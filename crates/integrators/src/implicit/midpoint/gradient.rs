@@ -8,10 +8,10 @@ use metriplectic_equations::Path;
 use smallvec::SmallVec;
 
 use crate::discrete_gradient::GAUSS;
-use crate::implicit::algebra::{Matrix, add, dot, magnitude, vector};
+use crate::implicit::algebra::{FEW, Matrix, add, dot, magnitude, vector};
 use crate::implicit::metric::{Metric, MetricAlong, Units};
 use crate::implicit::orthogonal::scaled;
-use crate::implicit::parts::{CurvedPath, Parts, Second};
+use crate::implicit::parts::{Apart, CurvedPath, Parts, Second};
 use crate::implicit::velocity::Turn;
 use crate::numbers::{Lengths, List};
 use crate::round_off::bound::SUMMED;
@@ -170,7 +170,7 @@ impl<L: Lengths> LawAlong<'_, L> {
         match kind {
             GradientKind::Gonzalez if with_slope => {
                 let second = parts.second(law, &line.z);
-                Mean { value: second.df, slope: Some(line.dz().after(&second.hf)) }
+                Mean { value: second.df, slope: Some(line.dz().after(second.hf)) }
             }
             GradientKind::Gonzalez => Mean { value: parts.jet(law, &line.z).1, slope: None },
             GradientKind::MeanValue => self.mean_value(with_slope),
@@ -182,7 +182,7 @@ impl<L: Lengths> LawAlong<'_, L> {
                 value.numbers_mut().iter_mut().for_each(|w| *w *= 0.5);
                 let slope = slope.zip(back.slope).map(|(mut slope, back)| {
                     slope.add(1.0, &back);
-                    scaled(&slope, 0.5)
+                    scaled(slope, 0.5)
                 });
                 Mean { value, slope }
             }
@@ -375,6 +375,21 @@ impl<L: Lengths> LawAlong<'_, L> {
         Some(Stable { mean, dmean, defect, change, rounding, noise })
     }
 
+    /// The discrete gradient of the derivative of a law along a parameter, on a vector space: of its defect what is above round-off.
+    pub(super) fn above_round_off(&self, kind: GradientKind) -> L::Vector {
+        let &Self { parts, law, line } = self;
+        let (mut w, d) = (self.mean(kind, false).value, line.d());
+        let [start, end] = [line.x, &line.end].map(|y| parts.value(law, y));
+        let defect = but_round_off(end - start - dot(&w, d), end.abs() + start.abs());
+        let square = dot(d, d);
+        if underflows(square) {
+            add(&mut w, 1.0, &along_short(defect, line));
+        } else {
+            add(&mut w, defect / square, d);
+        }
+        w
+    }
+
     /// The first and the second derivative of the law at both ends of the path, and the first in its middle.
     fn nodes(&self, kind: GradientKind, slope: f64) -> Option<([[f64; 2]; 2], f64)> {
         let &Self { parts, law, line } = self;
@@ -451,7 +466,7 @@ impl<L: Lengths> Stable<L> {
         drift_correction: f64,
         along: &MovingLine<'_, L>,
         df_end: &L::Vector,
-    ) -> Matrix<L> {
+    ) -> Slope<L> {
         let trust = trust(self.change, self.rounding);
         let defect = self.defect + drift_correction;
         self.corrected(defect, along, df_end, |row, _| row * trust)
@@ -463,7 +478,7 @@ impl<L: Lengths> Stable<L> {
         self,
         along: &MovingLine<'_, L>,
         df_end: &L::Vector,
-    ) -> Matrix<L> {
+    ) -> Slope<L> {
         // The defect is an integral and a part of a difference, whose round-off is rounded once more where the integral replaces it.
         let size = SUMMED * (self.change.abs() + self.rounding) + self.noise;
         let defect = if self.defect.abs() <= size { 0.0 } else { self.defect };
@@ -478,13 +493,13 @@ impl<L: Lengths> Stable<L> {
         &MovingLine { line, metric }: &MovingLine<'_, L>,
         df_end: &L::Vector,
         above: impl Fn(f64, &dyn Fn() -> f64) -> f64,
-    ) -> Matrix<L> {
+    ) -> Slope<L> {
         let Self { mean, dmean, .. } = self;
         let mut slope = dmean.expect("the derivatives were asked for");
         let (d, flat) = (line.d(), line.flat());
         let square = dot(flat, d);
         if underflows(square) {
-            return slope;
+            return Slope { matrix: slope, apart: None };
         }
         let n = d.numbers().len();
         let (bent, sizes) = (slope.transpose_times(d), &slope);
@@ -497,9 +512,16 @@ impl<L: Lengths> Stable<L> {
                 let row = above(df_end[i] - mean[i] - bent[i], &terms);
                 (row - d[i] * (2.0 * c)) * reciprocal
             });
+            if n > FEW {
+                (0..n).for_each(|i| slope[(i, i)] += c);
+                let base = slope.clone();
+                slope.add_outer(1.0, d, &along);
+                let apart = Apart { base, column: d.clone(), row: along };
+                return Slope { matrix: slope, apart: Some(Box::new(apart)) };
+            }
             slope.add_outer(1.0, d, &along);
             slope.add(c, &Matrix::scaled_one(n, 1.0));
-            return slope;
+            return Slope { matrix: slope, apart: None };
         };
         // ∂g along z, in ♭d and in G(d, d).
         let of_metric = metric.map(|metric| metric.of_flat(d));
@@ -520,8 +542,14 @@ impl<L: Lengths> Stable<L> {
             slope.add(c, of_metric);
         }
         slope.add(c, &dd.map_columns(|column| line.units().flat(column)));
-        slope
+        Slope { matrix: slope, apart: None }
     }
+}
+
+/// The derivative of a discrete gradient along the displacement, with its summands if they are known apart.
+pub(super) struct Slope<L: Lengths> {
+    pub(super) matrix: Matrix<L>,
+    pub(super) apart: Option<Box<Apart<L>>>,
 }
 
 /// A path with its derivatives, and the metric at its base with those along the unknown, if it is not the canonical one.

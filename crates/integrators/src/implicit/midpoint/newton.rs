@@ -2,7 +2,7 @@
 //! it follows.
 
 use super::equation::{Dissipated, Equation, Evaluated, Linearised, Rounding};
-use crate::implicit::algebra::{Matrix, add, dot, magnitude};
+use crate::implicit::algebra::{FEW, Matrix, add, dot, magnitude};
 use crate::implicit::parts::Parts;
 use crate::newton::{
     INVERTED, MARGIN, NEAR, NOISE, NORM, Newton, SURE, Stiffness, UNCHECKED, corrections, reaches,
@@ -83,8 +83,19 @@ impl<L: Lengths> Inverse<L> {
         // J⁻¹(J − 1) = 1 − J⁻¹.
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
         let of_terms = matrix.abs_times(terms);
-        let of_covectors = matrix.product(sensitivity).abs_times(covector);
-        let of_points = parts.matrix(|i, j| (one(i, j) - matrix[(i, j)]).abs()).times(argument);
+        let moved = parts.matrix(|i, j| (one(i, j) - matrix[(i, j)]).abs());
+        // |J⁻¹G|η is between |G|η − |1 − J⁻¹||G|η and their sum, and needs no product of matrices where these are close.
+        let shared = sensitivity.abs_times(covector);
+        let is_close = || {
+            let changed = moved.times(&shared);
+            (0..n).all(|i| changed[i] <= 0.25 * shared[i])
+        };
+        let of_covectors = if n > FEW && is_close() {
+            shared
+        } else {
+            matrix.product(sensitivity).abs_times(covector)
+        };
+        let of_points = moved.times(argument);
         // A point and its compensation have twice the digits: smaller displacements move nothing.
         let round_off = parts
             .vector(|i| of_terms[i] + of_covectors[i] + of_points[i] + argument[i] * f64::EPSILON);

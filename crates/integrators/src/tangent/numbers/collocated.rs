@@ -6,8 +6,10 @@
 //!
 //! ```math
 //! J = 1 - (b^T \otimes 1) \Bigl(\frac{\partial R}{\partial Y}\Bigr)^{-1} \frac{\partial R}{\partial x}, \qquad
-//! \frac{\partial x'}{\partial h} = -(b^T \otimes 1) \Bigl(\frac{\partial R}{\partial Y}\Bigr)^{-1} \frac{\partial R}{\partial h} .
+//! \frac{\partial x'}{\partial h} = -(b^T \otimes 1) \Bigl(\frac{\partial R}{\partial Y}\Bigr)^{-1} \frac{\partial R}{\partial h} ,
 //! ```
+//!
+//! and along parameters as along `h`.
 
 pub(super) mod along;
 mod equation;
@@ -25,7 +27,7 @@ use self::along::Around;
 use super::super::error::Unlinearised;
 use super::super::factors::Refined;
 use super::units::{differential, relative, reproduced, units};
-use super::{Derivative, StepOfModel};
+use super::{Derivative, Pulled, StepOfModel};
 use crate::collocation::Tableau;
 use crate::implicit::is_flat;
 
@@ -35,10 +37,12 @@ struct AtRoot {
     matrix: DMatrix<f64>,
     /// `∂R/∂x`.
     along_x: DMatrix<f64>,
+    /// `∂R/∂θ`.
+    along_parameters: DMatrix<f64>,
     /// `∂R/∂h`.
     along_h: DVector<f64>,
-    /// The derivatives of the production of entropy along `x` and `Y`.
-    produced: [DVector<f64>; 2],
+    /// The derivatives of the production of entropy along `x`, `Y` and `θ`.
+    produced: [DVector<f64>; 3],
     tableau: &'static Tableau,
     units: DVector<f64>,
 }
@@ -52,8 +56,8 @@ impl AtRoot {
         reproduced(step, around.end())?;
         let (units, n) = (units(step), around.n());
         let equation::Derivatives { mut residual, mut produced } = equation::derivatives(&around)?;
-        let (size, all) = (residual.nrows(), residual.ncols());
-        for c in 0..all - 1 {
+        let (size, at_h) = (residual.nrows(), around.size_column());
+        for c in 0..at_h {
             let unit = units[c % n];
             residual.column_mut(c).scale_mut(unit);
             produced[c] *= unit;
@@ -61,11 +65,13 @@ impl AtRoot {
         for r in 0..size {
             residual.row_mut(r).unscale_mut(units[r % n]);
         }
+        let blocks = [(0, n), (n, size), (at_h + 1, step.parameters)];
         Ok(Self {
             matrix: residual.columns(n, size).into_owned(),
             along_x: residual.columns(0, n).into_owned(),
-            along_h: residual.column(all - 1).into_owned(),
-            produced: [(0, n), (n, size)].map(|(at, len)| produced.rows(at, len).into_owned()),
+            along_parameters: residual.columns(at_h + 1, step.parameters).into_owned(),
+            along_h: residual.column(at_h).into_owned(),
+            produced: blocks.map(|(at, len)| produced.rows(at, len).into_owned()),
             tableau,
             units,
         })
@@ -88,26 +94,36 @@ impl AtRoot {
             column[k] += 1.0;
             along_x.set_column(k, &column);
         }
-        let along_h = -self.end_of(&factors.solve(&self.along_h)?).component_mul(units);
-        Some(Derivative { along_x, along_h })
+        let moved = |residual: &DVector<f64>| {
+            Some(-self.end_of(&factors.solve(residual)?).component_mul(units))
+        };
+        let along_h = moved(&self.along_h)?;
+        let mut along_parameters = DMatrix::zeros(n, self.along_parameters.ncols());
+        for (k, residual) in self.along_parameters.column_iter().enumerate() {
+            along_parameters.set_column(k, &moved(&residual.into_owned())?);
+        }
+        Some(Derivative { along_x, along_parameters, along_h })
     }
 
-    /// `Jᵀ λ`, without `J`.
-    fn transposed(&self, costate: &[f64]) -> Option<DVector<f64>> {
+    /// `Jᵀ λ` and `(∂x'/∂θ)ᵀ λ`, without `J`.
+    fn transposed(&self, costate: &[f64]) -> Option<Pulled> {
         let (n, size) = (self.units.len(), self.matrix.nrows());
         let costate = DVector::from_column_slice(costate);
         let row = costate.component_mul(&self.units);
         let right = DVector::from_fn(size, |r, _| self.tableau.weights[r / n] * row[r % n]);
         let y = Refined::of(Cow::Owned(self.matrix.transpose()))?.solve(&right)?;
-        Some(costate - self.along_x.tr_mul(&y).component_div(&self.units))
+        let pulled = costate - self.along_x.tr_mul(&y).component_div(&self.units);
+        Some((pulled, -self.along_parameters.tr_mul(&y)))
     }
 
-    /// The derivative of the production of entropy where the start moves along `δ`.
+    /// The derivative of the production of entropy where the start, and the parameters behind it, move along `δ`.
     fn production(&self, delta: &DVector<f64>) -> Option<f64> {
-        let delta = delta.component_div(&self.units);
-        let y = -Refined::of(Cow::Borrowed(&self.matrix))?.solve(&(&self.along_x * &delta))?;
-        let [along_x, along_y] = &self.produced;
-        Some(along_x.dot(&delta) + along_y.dot(&y))
+        let (n, count) = (self.units.len(), self.along_parameters.ncols());
+        let (start, theta) = (delta.rows(0, n).component_div(&self.units), delta.rows(n, count));
+        let residual = &self.along_x * &start + &self.along_parameters * theta;
+        let y = -Refined::of(Cow::Borrowed(&self.matrix))?.solve(&residual)?;
+        let [along_x, along_y, along] = &self.produced;
+        Some(along_x.dot(&start) + along_y.dot(&y) + along.dot(&theta))
     }
 }
 
@@ -123,7 +139,7 @@ pub(in crate::tangent) fn derivative(
     AtRoot::of(step, tableau)?.derivative().ok_or(Unlinearised::Singular)
 }
 
-/// The derivative `Jᵀ λ` of a loss along the start of a step from that along its end.
+/// The derivatives of a loss along the start of a step and along the parameters from that along its end.
 ///
 /// # Errors
 ///
@@ -132,7 +148,7 @@ pub(in crate::tangent) fn pull_back(
     step: &StepOfModel<'_>,
     tableau: &'static Tableau,
     costate: &[f64],
-) -> Result<DVector<f64>, Unlinearised> {
+) -> Result<Pulled, Unlinearised> {
     AtRoot::of(step, tableau)?.transposed(costate).ok_or(Unlinearised::Singular)
 }
 
@@ -150,8 +166,8 @@ pub(in crate::tangent) fn entropy_law(
     let [before, after] = [before, after].map(DVector::from_column_slice);
     let produced = AtRoot::of(step, tableau).ok()?.production(&before)?;
     Some(relative(&[
-        differential(model, ENTROPY, end).dot(&after),
-        -differential(model, ENTROPY, x).dot(&before),
+        differential(model, ENTROPY, end, step.parameters).dot(&after),
+        -differential(model, ENTROPY, x, step.parameters).dot(&before),
         -produced,
     ]))
 }

@@ -35,6 +35,8 @@ struct Step<'a, 'b> {
     of: &'a StepOfSystem<'b>,
     /// The directions of the start.
     starts: DMatrix<f64>,
+    /// How the parameters move along them.
+    parameters: DMatrix<f64>,
 }
 
 impl Number {
@@ -80,14 +82,16 @@ impl Step<'_, '_> {
     /// The stage at the displacement `q`.
     fn stage(&self, q: &Along) -> Option<Stage> {
         let y: Vec<f64> = self.of.x.iter().zip(&q.value).map(|(x, q)| x + q).collect();
-        let laws = laws_at(self.of.model, &y);
+        let laws = laws_at(self.of.model, &y, self.of.parameters);
         if !laws.laws.iter().all(LawAt::is_finite) {
             return None;
         }
-        let Motion { velocity, slope, production, rise } = laws.motion(&y)?;
-        let directions = &self.starts + &q.slopes;
-        let production = Number { value: production, slopes: directions.tr_mul(&rise) };
-        Some(Stage { rates: Along { value: velocity, slopes: slope * directions }, production })
+        let Motion { velocity, slope, production, rise, along, rise_along } = laws.motion(&y)?;
+        let (directions, parameters) = (&self.starts + &q.slopes, &self.parameters);
+        let rise = directions.tr_mul(&rise) + parameters.tr_mul(&rise_along);
+        let production = Number { value: production, slopes: rise };
+        let slopes = slope * directions + along * parameters;
+        Some(Stage { rates: Along { value: velocity, slopes }, production })
     }
 
     /// The end before the projection and the production of entropy, by the rows of a tableau.
@@ -166,8 +170,10 @@ pub(in crate::tangent) fn propagate(
         return Ok(Moved { carried, along_h: DVector::zeros(n) });
     }
     let columns = carried.t.ncols();
-    let starts = carried.t.clone().insert_column(columns, 0.0);
-    let step = Step { of, starts };
+    let whole = carried.t.clone().insert_column(columns, 0.0);
+    let starts = whole.rows(0, n).into_owned();
+    let parameters = whole.rows(n, of.parameters).into_owned();
+    let step = Step { of, starts, parameters };
     let (end, rise) = match of.stage_count {
         Some(count) => step.by_recursion(count),
         None => step.by_rows(tableau),
@@ -193,14 +199,16 @@ pub(in crate::tangent) fn propagate(
         value: DVector::from_fn(n, |i, _| of.x[i] + end.value[i]),
         slopes: &step.starts + &end.slopes,
     };
-    let landed = Landing { model: of.model, aim: &aim }.land(points, of.end)?;
+    let landing = Landing { model: of.model, aim: &aim, parameters: &step.parameters };
+    let landed = landing.land(points, of.end)?;
     reproduced(of, &landed.reached, &landed.rounding)?;
-    carried.t.copy_from(&landed.slopes.columns(0, columns));
+    carried.t.rows_mut(0, n).copy_from(&landed.slopes.columns(0, columns));
     if is_targeted {
         carried.laws.entropy = DVector::from_fn(columns, |c, _| produced[c].eps);
     } else if is_exact {
-        let laws = laws_at(of.model, of.end).laws;
-        carried.laws.entropy = carried.t.tr_mul(&laws[ENTROPY].df);
+        let LawAt { df, along, .. } = &laws_at(of.model, of.end, of.parameters).laws[ENTROPY];
+        let parameters = step.parameters.columns(0, columns);
+        carried.laws.entropy = carried.t.rows(0, n).tr_mul(df) + parameters.tr_mul(along);
     }
     Ok(Moved { carried, along_h: landed.slopes.column(columns).into_owned() })
 }

@@ -46,6 +46,8 @@ pub(super) struct Aim {
 pub(super) struct Landing<'a> {
     pub(super) model: &'a dyn Equations,
     pub(super) aim: &'a Aim,
+    /// How the parameters move along the columns.
+    pub(super) parameters: &'a DMatrix<f64>,
 }
 
 /// A law made independent of those before it.
@@ -99,7 +101,7 @@ impl Landing<'_> {
     }
 
     fn laws(&self, y: &[f64]) -> Result<Vec<LawAt>, Unlinearised> {
-        let laws = laws_at(self.model, y).laws;
+        let laws = laws_at(self.model, y, self.parameters.nrows()).laws;
         if laws.iter().all(LawAt::is_finite) { Ok(laws) } else { Err(Unlinearised::NotSmooth) }
     }
 
@@ -107,8 +109,12 @@ impl Landing<'_> {
     fn pass(&self, laws: &[LawAt], y: &mut Along, residuals: Residuals) -> [DVector<f64>; 2] {
         let (n, columns) = y.slopes.shape();
         // The values and the differentials along all columns.
-        let along: Vec<_> =
-            laws.iter().map(|LawAt { df, hf, .. }| (y.slopes.tr_mul(df), hf * &y.slopes)).collect();
+        let parameters = self.parameters.columns(0, columns);
+        let along_columns = |LawAt { df, hf, along, df_along, .. }: &LawAt| {
+            let rise = y.slopes.tr_mul(df) + parameters.tr_mul(along);
+            (rise, hf * &y.slopes + df_along * parameters)
+        };
+        let along: Vec<_> = laws.iter().map(along_columns).collect();
         let mut normals = Vec::new();
         let mut first = [DVector::zeros(n), DVector::zeros(n)];
         let mut value = y.value.clone();

@@ -56,7 +56,7 @@ impl Steps {
         self,
         step: &StepOfModel<'_>,
         costate: &DVector<f64>,
-    ) -> Result<DVector<f64>, Unlinearised> {
+    ) -> Result<Pulled, Unlinearised> {
         let costate = costate.as_slice();
         match self {
             Self::Along(line) => schemes::pull_back(step, line, costate),
@@ -85,6 +85,7 @@ fn step_of<'a>(
         x,
         end,
         h,
+        parameters: 0,
         allowed: None,
         targets,
         entropy_step: None,
@@ -114,7 +115,7 @@ fn obeys_laws(name: &str, steps: Steps, step: &StepOfModel<'_>, bound: f64) -> D
     let mut worst = 0.0_f64;
     let kept = std::iter::once(ENERGY).chain(ENTROPY + 1..step.model.sizes().laws);
     for law in kept {
-        let [before, after] = [step.x, step.end].map(|x| differential(step.model, law, x));
+        let [before, after] = [step.x, step.end].map(|x| differential(step.model, law, x, 0));
         let row = at.along_x.tr_mul(&after);
         let terms = at.along_x.abs().tr_mul(&after.abs());
         for k in 0..units.len() {
@@ -126,7 +127,7 @@ fn obeys_laws(name: &str, steps: Steps, step: &StepOfModel<'_>, bound: f64) -> D
     }
     let (v, row) = (some(&units, 0.3), some(&units.map(f64::recip), 0.9));
     let moved = &at.along_x * &v;
-    let pulled = steps.pull_back(step, &row).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let (pulled, _) = steps.pull_back(step, &row).unwrap_or_else(|error| panic!("{name}: {error}"));
     let terms = row.abs().dot(&(at.along_x.abs() * v.abs())) + pulled.abs().dot(&v.abs());
     let transposed = (row.dot(&moved) - pulled.dot(&v)).abs() / terms;
     let entropy = steps.entropy_law(step, [&v, &moved]);

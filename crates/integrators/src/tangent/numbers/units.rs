@@ -8,6 +8,7 @@ use super::super::certificate::worse;
 use super::super::error::Unlinearised;
 use super::super::explicit::NEAR;
 use super::StepOfModel;
+use crate::implicit::law_along_parameters;
 use crate::round_off::bound::BROKEN;
 use crate::system::NO_CLOCK;
 
@@ -28,11 +29,17 @@ pub(super) fn scaled(numbers: &[f64], units: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| numbers[i * n + j] * units[j] / units[i])
 }
 
-/// The differential of a law at a state.
-pub(super) fn differential(model: &dyn Model, law: usize, x: &[f64]) -> DVector<f64> {
+/// The differential of a law at a state, and behind it the derivatives along so many parameters.
+pub(super) fn differential(
+    model: &dyn Model,
+    law: usize,
+    x: &[f64],
+    parameters: usize,
+) -> DVector<f64> {
     let mut df = DVector::zeros(x.len());
     model.jet(law, NO_CLOCK, x, df.as_mut_slice());
-    df
+    let (along, _) = law_along_parameters(model, law, x, parameters);
+    DVector::from_iterator(df.len() + parameters, df.iter().chain(&along).copied())
 }
 
 /// The sum of terms relative to their sizes; zero if they cancel.

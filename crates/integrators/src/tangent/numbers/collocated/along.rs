@@ -1,13 +1,13 @@
 //! Numbers and vectors along the unknowns of a step with stages.
 //!
-//! The derivatives stand in columns: those along the start `x`, then those along the displacements `Y_i` of the stages, and that along
-//! the size `h`.
+//! The derivatives stand in columns: those along the start `x`, then those along the displacements `Y_i` of the stages, that along the
+//! size `h`, and those along the parameters.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::super::StepOfModel;
 use crate::collocation::{STAGES, Tableau};
-use crate::implicit::{Matrix, Parts, StageRoot};
+use crate::implicit::{Matrix, Parts, Second, StageRoot, law_along_parameters};
 use crate::numbers::AtRunTime;
 use crate::step::{Directions, Entries};
 
@@ -138,7 +138,49 @@ impl<'a> Around<'a> {
 
     /// The number of columns.
     pub(in crate::tangent::numbers) fn columns(&self) -> usize {
-        self.n() * (self.tableau.stages + 1) + 1
+        self.size_column() + 1 + self.step.parameters
+    }
+
+    /// The column of the size `h`, behind those of vectors.
+    pub(in crate::tangent::numbers) fn size_column(&self) -> usize {
+        self.n() * (self.tableau.stages + 1)
+    }
+
+    /// The size `h` itself.
+    pub(in crate::tangent::numbers) fn size(&self) -> Number {
+        let mut size = Number { value: self.step.h, ..Number::zero(self.columns()) };
+        size.row[self.size_column()] = 1.0;
+        size
+    }
+
+    /// The derivatives of a law and of its differential along the parameters, at a state that stays where it is.
+    pub(in crate::tangent::numbers) fn along_parameters(
+        &self,
+        law: usize,
+        x: &[f64],
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        law_along_parameters(self.step.model, law, x, self.step.parameters)
+    }
+
+    /// Sets the columns of the parameters.
+    pub(in crate::tangent::numbers) fn set_along_parameters(
+        &self,
+        slope: &mut DMatrix<f64>,
+        along: &DMatrix<f64>,
+    ) {
+        slope.columns_mut(self.size_column() + 1, along.ncols()).copy_from(along);
+    }
+
+    /// The differential of a law at a state that moves by `c₀ δx + Σ_j c_j δY_j`.
+    pub(in crate::tangent::numbers) fn covector(
+        &self,
+        (law, x): (usize, &Entries),
+        moves: (f64, &Coefficients),
+    ) -> Along {
+        let Second { df, hf } = self.parts.second(law, x);
+        let mut slope = self.spread(moves, &dense(&hf, self.n()));
+        self.set_along_parameters(&mut slope, &self.along_parameters(law, x).1);
+        Along { value: column(&df), slope }
     }
 
     /// `Σ_j c_j Y_j`.

@@ -18,7 +18,7 @@ pub(super) struct Derivatives {
 
 /// The derivatives of a step.
 pub(super) fn derivatives(around: &Around<'_>) -> Result<Derivatives, Unlinearised> {
-    let &Around { ref parts, tableau, step, .. } = around;
+    let &Around { ref parts, tableau, .. } = around;
     let (n, columns, s) = (around.n(), around.columns(), tableau.stages);
     let laws = parts.each_law(|law| LawAlong::of(around, law));
     let listed = || [&laws.energy, &laws.entropy].into_iter().chain(&laws.invariants);
@@ -49,12 +49,11 @@ pub(super) fn derivatives(around: &Around<'_>) -> Result<Derivatives, Unlinearis
         let lost = [&laws.energy.lost, &laws.entropy.lost];
         heat = Some(Heating { around, still, flat: &flat, lost }.add(&mut stages)?);
     }
-    let mut size = Number::zero(columns);
-    (size.value, size.row[columns - 1]) = (step.h, 1.0);
+    let size = around.size();
     let mut produced = heat.as_ref().map_or_else(|| Number::zero(columns), |h| h.gain.clone());
     let mut residual = DMatrix::zeros(s * n, columns);
     for (i, stage) in stages.iter().enumerate() {
-        let [velocity, friction] = stage.velocity(parts)?;
+        let [velocity, friction] = stage.velocity(around)?;
         let mut off = around.displacement(i);
         off.add_times(&size.scaled(-1.0), &velocity);
         if let Some(heat) = &heat {

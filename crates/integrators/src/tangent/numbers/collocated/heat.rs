@@ -5,7 +5,7 @@ use metriplectic_equations::ENERGY;
 use nalgebra::DVector;
 
 use super::super::super::error::Unlinearised;
-use super::along::{Along, Around, Number, column, dense};
+use super::along::{Along, Around, Number};
 use super::stage::{Flat, Stage};
 use crate::collocation::{STAGES, fraction};
 use crate::implicit::{Matrix, OrthogonalJet, WithJacobian};
@@ -34,14 +34,14 @@ impl Heating<'_> {
     /// The vector along which a stage is warmed.
     fn sharp(&self, stage: &Stage) -> Result<Along, Unlinearised> {
         let n = self.around.n();
-        let [sharp] = stage.chained(|_, _, w| {
+        let [sharp] = stage.chained(self.around, |_, _, w| {
             let mut normals = OrthogonalJet::none();
             for i in (0..n).filter(|i| self.still[*i]) {
                 let value = Directions::from_index(n, |j| if j == i { 1.0 } else { 0.0 });
-                normals.push(&WithJacobian { value, slope: Matrix::zeros(n) });
+                normals.push(&WithJacobian::new(value, Matrix::zeros(n)));
             }
             w.invariants.iter().for_each(|l| normals.push(l));
-            Some([normals.covector(0, &w.entropy)])
+            Some([normals.covector(0, w.entropy.clone())])
         })?;
         Ok(sharp)
     }
@@ -65,7 +65,7 @@ impl Heating<'_> {
     /// Says whether friction vanishes at every stage.
     fn is_reversible(&self, stages: &[Stage]) -> Result<bool, Unlinearised> {
         for stage in stages {
-            let [_, friction] = stage.velocity(&self.around.parts)?;
+            let [_, friction] = stage.velocity(self.around)?;
             if friction.value.iter().any(|v| *v != 0.0) {
                 return Ok(false);
             }
@@ -119,18 +119,16 @@ impl Heating<'_> {
     /// The fraction of what is lost that becomes heat.
     fn transient(&self, stages: &[Stage]) -> Result<Number, Unlinearised> {
         let Self { around, .. } = self;
-        let (n, columns, parts) = (around.n(), around.columns(), &around.parts);
+        let (n, columns) = (around.n(), around.columns());
         let weights = &around.tableau.weights;
-        let second = parts.second(ENERGY, &Entries::of(around.step.x));
-        let slope = around.spread((1.0, &[0.0; STAGES]), &dense(&second.hf, n));
-        let start = Along { value: column(&second.df), slope };
-        let mut size = Number::zero(columns);
-        (size.value, size.row[columns - 1]) = (around.step.h, 1.0);
+        let start = (ENERGY, &Entries::of(around.step.x));
+        let start = around.covector(start, (1.0, &[0.0; STAGES]));
+        let size = around.size();
         let mut moved = Vec::new();
         let mut means = [Along::zero(n, columns), Along::zero(n, columns)];
         for (i, stage) in stages.iter().enumerate() {
             let mut motion = Along::zero(n, columns);
-            motion.add_times(&size, &stage.reversible(parts)?);
+            motion.add_times(&size, &stage.reversible(around)?);
             let mut friction = around.displacement(i);
             friction.add(-1.0, &motion);
             let both = [motion, friction];

@@ -24,12 +24,19 @@ struct Slope {
     along: DVector<f64>,
 }
 
+/// A law at a stage: its differential, its Hessian, and the derivatives of the differential along the parameters.
+struct OfStage {
+    df: DVector<f64>,
+    hf: DMatrix<f64>,
+    along: DMatrix<f64>,
+}
+
 impl Slope {
-    fn of(around: &Around<'_>, stages: &[(DVector<f64>, DMatrix<f64>)]) -> Self {
+    fn of(around: &Around<'_>, stages: &[OfStage]) -> Self {
         let (n, columns, tableau) = (around.n(), around.columns(), around.tableau);
         let mut slope =
             Self { sum: Number::zero(columns), size: 0.0, along: DVector::zeros(columns) };
-        for (i, (df, hf)) in stages.iter().enumerate() {
+        for (i, OfStage { df, hf, along }) in stages.iter().enumerate() {
             let (y, b) = (&around.displacements[i], tableau.weights[i]);
             slope.sum.value += b * df.dot(y);
             slope.size += b * df.abs().dot(&y.abs());
@@ -47,6 +54,11 @@ impl Slope {
             for j in 0..tableau.stages {
                 block((j + 1) * n, tableau.matrix[i][j], i == j);
             }
+            for (k, along) in along.column_iter().enumerate() {
+                let c = around.size_column() + 1 + k;
+                slope.sum.row[c] += b * along.dot(y);
+                slope.along[c] += b * along.abs().dot(&y.abs());
+            }
         }
         slope
     }
@@ -54,14 +66,12 @@ impl Slope {
 
 /// The change of a law along the polynomial of the step, as an integral.
 fn integral(around: &Around<'_>, law: usize) -> Number {
-    let Around { parts, tableau, .. } = around;
+    let tableau = around.tableau;
     let one = DMatrix::identity(around.n(), around.n());
     tableau.points().iter().fold(Number::zero(around.columns()), |sum, point| {
         // Their positions are those from the middle.
         let position = std::array::from_fn(|j| point.position[j] + 0.5 * tableau.weights[j]);
-        let second = parts.second(law, &around.state(&position));
-        let (df, hf) = (column(&second.df), dense(&second.hf, around.n()));
-        let df = Along { value: df, slope: around.spread((1.0, &position), &hf) };
+        let df = around.covector((law, &around.state(&position)), (1.0, &position));
         let value = around.combined(&point.velocity);
         let velocity = Along { value, slope: around.spread((0.0, &point.velocity), &one) };
         Number::sum([1.0, point.weight], [&sum, &df.dot(&velocity)])
@@ -73,18 +83,21 @@ impl LawAlong {
         let &Around { ref parts, tableau, step, .. } = around;
         let stages: Vec<_> = (0..tableau.stages)
             .map(|i| {
-                let second = parts.second(law, &around.state(&tableau.matrix[i]));
-                (column(&second.df), dense(&second.hf, around.n()))
+                let place = around.state(&tableau.matrix[i]);
+                let second = parts.second(law, &place);
+                let (df, hf) = (column(&second.df), dense(&second.hf, around.n()));
+                OfStage { df, hf, along: around.along_parameters(law, &place).1 }
             })
             .collect();
         let ends = [step.x, step.end].map(|x| {
             let (value, df) = parts.jet(law, &Entries::of(x));
-            (value, column(&df))
+            (value, column(&df), around.along_parameters(law, x).0)
         });
         let lost = lost(around, law, &stages, &ends);
-        let covectors = stages.into_iter().enumerate().map(|(i, (value, hf))| {
-            let slope = around.spread((1.0, &tableau.matrix[i]), &hf);
-            Along { value, slope }
+        let covectors = stages.into_iter().enumerate().map(|(i, OfStage { df, hf, along })| {
+            let mut slope = around.spread((1.0, &tableau.matrix[i]), &hf);
+            around.set_along_parameters(&mut slope, &along);
+            Along { value: df, slope }
         });
         Self { covectors: covectors.collect(), lost }
     }
@@ -98,24 +111,27 @@ impl LawAlong {
 fn lost(
     around: &Around<'_>,
     law: usize,
-    stages: &[(DVector<f64>, DMatrix<f64>)],
-    [before, after]: &[(f64, DVector<f64>); 2],
+    stages: &[OfStage],
+    [before, after]: &[(f64, DVector<f64>, DVector<f64>); 2],
 ) -> Number {
     let tableau = around.tableau;
     let Slope { sum: slope, size, along } = Slope::of(around, stages);
-    let rows = |start, c, df: &DVector<f64>| {
-        let row = around.spread((start, c), &DMatrix::from_row_slice(1, df.len(), df.as_slice()));
+    let rows = |c, (_, df, along): &(f64, DVector<f64>, DVector<f64>)| {
+        let df = DMatrix::from_row_slice(1, df.len(), df.as_slice());
+        let mut row = around.spread((1.0, c), &df);
+        let along = DMatrix::from_row_slice(1, along.len(), along.as_slice());
+        around.set_along_parameters(&mut row, &along);
         row.transpose().column(0).into_owned()
     };
-    let of_start = rows(1.0, &[0.0; crate::collocation::STAGES], &before.1);
-    let of_end = rows(1.0, &tableau.weights, &after.1);
+    let of_start = rows(&[0.0; crate::collocation::STAGES], before);
+    let of_end = rows(&tableau.weights, after);
     let sizes = along + of_start.abs() + of_end.abs();
     let change = Number { value: after.0 - before.0, row: of_end - of_start };
     let lost = Number::sum([1.0, -1.0], [&change, &slope]);
     // How far the integral is trusted, by the size of the change and the function.
     let scales = DVector::from_column_slice(around.step.end).abs();
     let mut rounded = before.0.abs() + after.0.abs();
-    for ((df, _), b) in stages.iter().zip(&tableau.weights) {
+    for (OfStage { df, .. }, b) in stages.iter().zip(&tableau.weights) {
         rounded += b * df.abs().dot(&scales);
     }
     let fraction = short(size, rounded);

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use super::super::super::error::Unlinearised;
 use super::along::{Along, Around, Number, column, dense};
 use crate::implicit::{
-    Matrix, OfLaws, Parts, VelocityJet, WithJacobian, reversible_jet, whole_velocity_jet,
+    Columns, Matrix, OfLaws, VelocityJet, WithJacobian, reversible_jet, whole_velocity_jet,
 };
 use crate::numbers::AtRunTime;
 use crate::step::{Directions, Entries};
@@ -50,13 +50,15 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Vectors along the unknowns, by the chain rule: from their derivatives along the place and along each covector, for which `jets`
-    /// is asked with those of the place, a multiple of the identity, and of the covectors.
+    /// Vectors along the unknowns and the parameters, by the chain rule: from their derivatives along the place and along each covector,
+    /// for which `jets` is asked with those of the place, a multiple of the identity, and of the covectors; and from those along
+    /// parameters alone.
     pub(super) fn chained<const K: usize>(
         &self,
+        around: &Around<'_>,
         jets: impl Fn(
             &Entries,
-            f64,
+            Columns,
             &OfLaws<WithJacobian<AtRunTime>>,
         ) -> Option<[WithJacobian<AtRunTime>; K]>,
     ) -> Result<[Along; K], Unlinearised> {
@@ -64,40 +66,52 @@ impl Stage {
         let mut along: [Along; K] = std::array::from_fn(|_| Along::zero(n, columns));
         let all = [&self.w.energy, &self.w.entropy].into_iter().chain(&self.w.invariants);
         let arguments = std::iter::once(&self.moved).chain(all.map(|w| &w.slope));
-        for (argument, slope) in arguments.enumerate() {
+        let seeded = |argument: usize| {
             let mut number = 0;
-            let w = self.w.map(|w| {
+            self.w.map(|w| {
                 number += 1;
                 let own = if number == argument { 1.0 } else { 0.0 };
-                WithJacobian { value: w.numbers(), slope: Matrix::scaled_one(n, own) }
-            });
-            let at = if argument == 0 { 1.0 } else { 0.0 };
-            let jets = jets(&self.place, at, &w).ok_or(Unlinearised::Singular)?;
+                WithJacobian::new(w.numbers(), Matrix::scaled_one(n, own))
+            })
+        };
+        for (argument, slope) in arguments.enumerate() {
+            let at = Columns::Directions(if argument == 0 { 1.0 } else { 0.0 });
+            let jets = jets(&self.place, at, &seeded(argument)).ok_or(Unlinearised::Singular)?;
             for (along, jet) in along.iter_mut().zip(jets) {
                 along.value = column(&jet.value);
                 along.slope += dense(&jet.slope, n) * slope;
+            }
+        }
+        let count = around.step.parameters;
+        for first in (0..count).step_by(n) {
+            let len = n.min(count - first);
+            let (chunk, w) = (Columns::Parameters(first..first + len), seeded(0));
+            let jets = jets(&self.place, chunk, &w).ok_or(Unlinearised::Singular)?;
+            for (along, jet) in along.iter_mut().zip(jets) {
+                let mut to = along.slope.columns_mut(around.size_column() + 1 + first, len);
+                to += dense(&jet.slope, n).columns(0, len);
             }
         }
         Ok(along)
     }
 
     /// The velocity, and the part of friction and force in it.
-    pub(super) fn velocity(
-        &self,
-        parts: &Parts<'_, AtRunTime>,
-    ) -> Result<[Along; 2], Unlinearised> {
-        self.chained(|x, moved, w| {
-            let jet = whole_velocity_jet(parts, x, moved, w)?;
+    pub(super) fn velocity(&self, around: &Around<'_>) -> Result<[Along; 2], Unlinearised> {
+        let parts = &around.parts;
+        self.chained(around, |x, columns, w| {
+            let jet = whole_velocity_jet(parts, x, columns, w)?;
             let VelocityJet { velocity, irreversible, .. } = jet;
             let n = parts.n();
-            let none = || WithJacobian { value: Directions::zeros(n), slope: Matrix::zeros(n) };
+            let none = || WithJacobian::new(Directions::zeros(n), Matrix::zeros(n));
             Some([velocity, irreversible.unwrap_or_else(none)])
         })
     }
 
     /// The part of the bracket.
-    pub(super) fn reversible(&self, parts: &Parts<'_, AtRunTime>) -> Result<Along, Unlinearised> {
-        let [v] = self.chained(|x, moved, w| Some([reversible_jet(parts, x, moved, w)?]))?;
+    pub(super) fn reversible(&self, around: &Around<'_>) -> Result<Along, Unlinearised> {
+        let jets =
+            |x: &Entries, columns, w: &_| Some([reversible_jet(&around.parts, x, columns, w)?]);
+        let [v] = self.chained(around, jets)?;
         Ok(v)
     }
 }

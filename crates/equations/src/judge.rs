@@ -161,7 +161,7 @@ impl<'a> Judge<'a> {
 
     /// Compares the derivatives of a model along its [parameters](Model::parameters) with the values of the models beside it, at a state
     /// and at one near it. `values` are those of the parameters, and `beside` calls its function with the model whose parameters are
-    /// displaced by the numbers it is given; it returns `false` where there is none. A model that knows none of them is not asked.
+    /// displaced by the numbers it is given; it returns `false` where there is none. A model that knows no parameter is not compared.
     ///
     /// # Errors
     ///

@@ -1,6 +1,10 @@
 //! Implicit methods for typed systems: of few variables, and of any on a curved space, in the types of the system; of many variables
 //! on a vector space in plain numbers.
 
+#[cfg(test)]
+#[macro_use]
+mod ring;
+
 mod many;
 mod schemes;
 mod stages;

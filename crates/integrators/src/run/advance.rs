@@ -1,4 +1,4 @@
-//! One step of a run, by any method: compiled once for each space.
+//! The step of a run by any method, which is compiled once for each space.
 
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::StepOf;
@@ -361,7 +361,7 @@ fn moves_on<F: Flow + ?Sized>(
     (0..zero.len()).all(|i| h * (end.get(i) - start.get(i)).abs() <= allowed.get(i))
 }
 
-/// Whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.
+/// Returns whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.
 fn is_finite<L>(laws: &Laws<L>) -> bool {
     laws.energy.is_finite() && laws.entropy.is_finite()
 }

@@ -187,7 +187,7 @@ pub(crate) struct Interval {
     pub(crate) h: f64,
     /// The time that is recorded at its end.
     pub(crate) recorded: f64,
-    /// Whether it ends before a corner.
+    /// It ends before a corner.
     pub(crate) is_corner: bool,
 }
 

@@ -304,7 +304,7 @@ fn error_of(start: &StepStart<'_, PlainFlow<'_>>, panicked: Panicked) -> StepErr
 }
 
 impl<F: Written, M: Stepper<F>> MethodInTypes<'_, F, M> {
-    /// Whether it is a method of this library without random numbers, so that its answers about a path are not compiled.
+    /// Says whether the method is one of this library without random numbers, whose answers about a path are not compiled.
     const HAS_NO_PATH: bool = M::IS_EXPLICIT || M::IS_IMPLICIT;
 
     #[inline]

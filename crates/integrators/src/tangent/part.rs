@@ -23,7 +23,7 @@ pub(super) struct Again<V> {
     pub(super) sizes: V,
     /// The size of the whole step.
     pub(super) whole: f64,
-    /// Whether no step beside it has another time or another size, because a corner is near.
+    /// A corner is near: no step beside it has another time or another size.
     pub(super) is_still: bool,
 }
 

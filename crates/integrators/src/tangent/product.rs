@@ -54,7 +54,7 @@ impl<F: Flow> Product<F> {
     }
 }
 
-/// Where a step ends.
+/// The end of a step.
 pub(super) enum Reach<'a, F: Flow> {
     /// At the end of the step that was taken.
     End(&'a Element<F>),
